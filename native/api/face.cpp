@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "api/errors.h"
 #include "bytes/source.h"
@@ -41,6 +42,14 @@ Status check(const risorius_options& options) {
   if (options.lod_count > 0 && options.lods == nullptr) {
     return bad("options.lods", "a list was expected, found NULL");
   }
+  std::vector<bool> asked(std::size_t{1} << 16, false);
+  for (const std::uint16_t lod : std::span(options.lods, options.lod_count)) {
+    if (asked[lod]) {
+      return fail(ErrorCode::kInvalidArgument, "options.lods",
+                  "each LOD once was expected, found " + std::to_string(lod) + " twice");
+    }
+    asked[lod] = true;
+  }
   if (options.mesh_count > 0 && options.meshes == nullptr) {
     return bad("options.meshes", "a list was expected, found NULL");
   }
@@ -68,6 +77,16 @@ compile::CompileOptions compile_options(const risorius_options& options) {
   if ((options.flags & RISORIUS_QUATERNIONS) != 0) out.rotation = compile::Rotation::kQuaternion;
   if ((options.flags & RISORIUS_FLOAT16) != 0) out.precision = compile::Precision::kFloat16;
   return out;
+}
+
+// The parser passes over LODs that are not there, as the format's own filter does.
+Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
+  std::vector<std::uint16_t> asked(options.lods, options.lods + options.lod_count);
+  const std::size_t found = dna.descriptor.lod_count;
+  if (asked.size() <= found) return ok();
+  std::ranges::sort(asked);
+  return fail(ErrorCode::kInvalidArgument, "options.lods",
+              "LODs of the file were expected, found " + std::to_string(asked[found]));
 }
 
 // Drops the geometry of meshes that are not named.
@@ -104,6 +123,7 @@ void drop_behavior(dna::Dna& dna) {
 Result<Face> make_face(core::Source& source, const risorius_options& options) {
   Result<dna::Dna> dna = dna::parse(source, parse_options(options));
   if (!dna) return std::move(dna).propagate();
+  RISORIUS_TRY(has_all_lods(options, *dna));
   RISORIUS_TRY(keep_meshes(options, *dna));
   Result<rig::Rig> rig = compile::compile(*dna, compile_options(options));
   if (!rig) return std::move(rig).propagate();

@@ -104,7 +104,8 @@ enum {
 typedef struct risorius_options {
   uint32_t flags;            /* RISORIUS_GEOMETRY and those after it */
   uint32_t lod_count;        /* 0: all */
-  const uint16_t* lods;      /* uint16[lod_count]; what no kept LOD uses is gone, and every index
+  const uint16_t* lods;      /* uint16[lod_count], each once and in the file; what no kept LOD
+                                uses is gone, and every index
                                 counts in what is left */
   uint32_t mesh_count;       /* 0: all; else asks for RISORIUS_GEOMETRY */
   const char* const* meshes; /* names of the meshes whose geometry is kept, UTF-8 */

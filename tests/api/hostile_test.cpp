@@ -173,6 +173,20 @@ TEST(ApiHostile, OptionsThatMakeNoSenseAreRefused) {
   options.flags = 0;
   options.lod_count = 1;
   refused(options, "options.lods");
+  const std::uint16_t there[] = {0, 1}, beyond[] = {0, 65535, 900}, twice[] = {1, 0, 1};
+  options.lods = beyond;
+  for (options.lod_count = 2; options.lod_count <= 3; ++options.lod_count) {
+    refused(options, "options.lods");
+  }
+  options.lods = twice;
+  refused(options, "options.lods");
+  const std::vector<std::uint16_t> million(1'000'000, 0);
+  options.lods = million.data();
+  options.lod_count = 1'000'000;
+  refused(options, "options.lods");
+  options.lods = there;
+  options.lod_count = 2;
+  EXPECT_EQ(risorius_count(open_golden("medium", options).get(), RISORIUS_LODS), 2u);
   options = {};
   options.mesh_count = 1;
   options.meshes = names;

@@ -2,7 +2,8 @@
 """What is done to the command line, and what must hold afterwards: packaging/faults.sh runs it.
 
 Bombs, flipped bits, kills, interrupts, full disks, folders that cannot be written, two processes at
-once. Each trial is a row: its group, its name, how often it ran, what went wrong.
+once, mutants of every command's inputs. Each trial is a row: its group, its name, how often it ran,
+what went wrong.
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "python"))
 
 from bombs import BOMBS, MiB  # noqa: E402
+from mutants_of_inputs import trials  # noqa: E402
 from risorius import importing  # noqa: E402
 from room import (  # noqa: E402
     COMMANDS,
@@ -376,10 +379,17 @@ def _batches(rounds: int) -> Row:
     return row
 
 
+def mutations(rounds: int, names: Sequence[str] = (), seed: int | None = None) -> Iterator[Row]:
+    """Mutants of every command's inputs, others in each run: a result or a sentence, in bounds."""
+    drawn = random.SystemRandom().randrange(1 << 32) if seed is None else seed
+    print(f"mutations: --seed {drawn} repeats them", flush=True)
+    yield from trials(5 * rounds, drawn, tuple(names))
+
+
 Group = Callable[[int], Iterator[Row]]
 GROUPS: dict[str, Group] = {
     "bombs": bombs, "flips": flips, "kills": kills, "interrupts": interrupts, "disks": disks,
-    "folders": folders, "pairs": pairs,
+    "folders": folders, "pairs": pairs, "mutations": mutations,
 }  # fmt: skip
 
 
@@ -396,12 +406,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("groups", nargs="*", choices=[*GROUPS, []], help="default: all")
     parser.add_argument("--rounds", type=int, default=20, help="of each kill and interrupt (20)")
+    parser.add_argument("--seed", type=int, help="of the mutations (default: another each time)")
     args = parser.parse_args()
+    groups = {**GROUPS, "mutations": partial(mutations, seed=args.seed)}
     with tempfile.TemporaryDirectory() as cache:
         os.environ["XDG_CACHE_HOME"] = cache
         count = 0
         for name in args.groups or GROUPS:
-            for row in GROUPS[name](args.rounds):
+            for row in groups[name](args.rounds):
                 print(line(row), flush=True)
                 count += len(row.faults)
     print(f"{count} faults")

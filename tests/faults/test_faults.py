@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import faults
+import mutants_of_inputs
 import pytest
 import room
 from conftest import PROJECT
@@ -48,6 +49,43 @@ def test_no_folder():
 
 def test_several_at_once():
     none_of(faults.pairs(1, ["convert"]))
+
+
+def test_mutations():
+    none_of(faults.mutations(1, mutants_of_inputs.QUICK, seed=50))
+
+
+def test_mutants_are_told_by_their_seed(tmp_path):
+    inputs = mutants_of_inputs.make_inputs(tmp_path)
+    for name in mutants_of_inputs.TRIALS:
+        first, second, other = (
+            mutants_of_inputs.Round(inputs, name, key) for key in ("1", "1", "2")
+        )
+        assert (first.files, first.words) == (second.files, second.words)
+        assert (first.files, first.words) != (other.files, other.words)
+
+
+@pytest.mark.parametrize(
+    ("fault", "seen"),
+    [
+        ("raise KeyError('mine')", "a traceback: KeyError: 'mine'"),
+        ("os.kill(os.getpid(), 11)", "ended by SIGSEGV"),
+        ("sys.exit(3)", "exit code 3"),
+        ("open('half', 'w'); raise OSError(5, 'bad', 'x')", "left ['half']"),
+        ("b'x' * (400 << 20)", "were allowed"),
+        ("import warnings; warnings.warn('odd', RuntimeWarning)", "a warning of Python's"),
+        ("os.write(1, b''); raise MemoryError", "all memory was asked for"),
+    ],
+)
+def test_a_planted_fault_is_seen_by_mutations(fault, seen, monkeypatch):
+    def run(args):
+        exec(fault, {"os": os, "sys": sys})
+        return 0
+
+    monkeypatch.setattr("risorius.cli.info.run", run)
+    row = mutants_of_inputs.rounds_of("info", 1, 2)
+    assert row.runs == 2
+    assert seen in "; ".join(row.faults)
 
 
 def planted(monkeypatch, code):

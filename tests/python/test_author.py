@@ -262,6 +262,7 @@ def test_without_room_for_the_page_there_is_no_face_either(folder, tmp_path, mon
     out.write_text("old")
     page.write_text("old too")
     made = SimpleNamespace(dna=risorius.load(GOLDEN / "core.dna"))
+    monkeypatch.setattr(author, "as_lines", lambda *_given: [])
     monkeypatch.setattr(author, "make_joint_rig", lambda *_given: made)
     monkeypatch.setattr(author, "report_page", lambda *_given: b"x" * 1_000_000)
     command = ["author", str(folder / "spec.toml"), "-o", str(out)]
@@ -599,15 +600,15 @@ def test_bad_input_is_one_sentence(tmp_path):
     for change, words in (
         ("[joint]\n", "joint: one of name, source, joints, shapes, correctives, lods, controls"),
         ("number = 3\n", "joints.number: one of count"),
-        ("rounds = 1.5\n", "joints.rounds: 1.5 is of another kind"),
-        ("influences = 99\n", "1 to 16 were expected, found 99"),
+        ("rounds = 1.5\n", "joints.rounds: a whole number was expected, found 1.5"),
+        ("influences = 99\n", "joints.influences: 1 to 16 was expected, found 99"),
         ("[lods]\ncount = 33\n", "lods.count: 1 to 32 was expected, found 33"),
         ("[lods]\njoints = [40, 50]\n", "lods.joints: numbers that do not grow were expected"),
         (
             "[lods]\ncount = 3\nvertices = [5, 4]\n",
             "lods.vertices: 3 numbers were expected, found 2",
         ),
-        ("[lods]\njoints = [4, true]\n", "lods.joints: whole numbers were expected"),
+        ("[lods]\njoints = [4, true]\n", "lods.joints: a whole number was expected, found True"),
     ):
         path.write_text(plain + change, encoding="utf-8")
         assert words in refused(path, "-o", out)

@@ -122,14 +122,14 @@ def test_a_sculpt_of_another_topology_is_one_sentence(tmp_path):
 @pytest.mark.parametrize(
     ("table", "sentence"),
     [
-        ('most = "many"', "correctives.most: 'many' is of another kind"),
-        ("most = -1", "correctives.most: 0 or more was expected"),
+        ('most = "many"', "correctives.most: a whole number was expected, found 'many'"),
+        ("most = -1", "correctives.most: 0 to 65535 was expected, found -1"),
         (
             "depth = 3",
             "correctives.depth: one of most, again, solids, triples, together was expected",
         ),
-        ("solids = [3]", "correctives.solids: names were expected, found [3]"),
-        ('together = ["jawOpen"]', "correctives.together: names were expected, found 'jawOpen'"),
+        ("solids = [3]", "correctives.solids: text was expected, found 3"),
+        ('together = ["jawOpen"]', "correctives.together: a list was expected, found 'jawOpen'"),
         ('together = [["jawOpen", "grin"]]', "correctives: there is no control grin"),
     ],
 )

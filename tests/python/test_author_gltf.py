@@ -177,6 +177,14 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
         lambda j: j.update(extensionsRequired=["KHR_draco_mesh_compression"])
     )
     assert "triangles were expected" in said(primitive("mode", 1))
+    assert "VEC3 was expected" in said(accessor(0, componentType=[]))
+    assert "found a list" in said(accessor(0, type=[1]))
+    huge = 10**400
+    assert "found a number of 401 digits" in said(accessor(0, count=huge))
+    assert "found a number of 401 digits" in said(
+        lambda j: j["bufferViews"][0].update(byteOffset=huge)
+    )
+    assert "3 finite numbers" in said(lambda j: j["nodes"][1].update(scale=[1, 1, huge]))
     assert "as many morph targets in all" in said(primitive("targets", []))
     assert "a table was expected" in said(primitive("targets", [3] * 7))
     assert "VEC3 was expected" in said(accessor(0, type="VEC4"))
@@ -185,6 +193,8 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
         lambda j: j["bufferViews"][0].update(byteStride=8)
     )
     assert "of 528 vertices were expected" in said(accessor(9, componentType=5120))
-    assert "3 numbers were expected" in said(lambda j: j["nodes"][1].update(scale=[1, "2", 3]))
+    assert "3 finite numbers were expected" in said(
+        lambda j: j["nodes"][1].update(scale=[1, "2", 3])
+    )
     assert "indices: row " in said(accessor(2, count=3))
     assert "indices and values" in said(accessor(2, sparse={"count": 1}))

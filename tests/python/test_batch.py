@@ -667,8 +667,7 @@ def test_bad_command_lines_are_exit_code_2(tmp_path, capsys):
     assert main(["batch", str(tmp_path / "absent.toml")]) == 1
     assert "absent.toml: cannot read it" in capsys.readouterr().err
     assert main(["batch", str(tmp_path / "absent.toml"), "--workers", "0"]) == 2
-    with pytest.raises(SystemExit, match="2"):
-        main(["batch", "x.toml", "--workers", "2", "--scheduler", "tcp://h:1"])
+    assert main(["batch", "x.toml", "--workers", "2", "--scheduler", "tcp://h:1"]) == 2
 
 
 # ---- what is shown

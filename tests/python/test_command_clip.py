@@ -123,7 +123,7 @@ def test_mappings_are_listed_copied_and_checked(tmp_path, capsys, monkeypatch):
         (["convert", "take.csv", "-o", "a.csv", "--cut", "2:1"], 2, "0 <= A <= B was expected"),
         (["convert", "take.csv", "-o", "a.csv", "--gain", "jaw"], 2, "PATTERN=NUMBER was expected"),
         (["convert", "take.csv", "-o", "a.csv", "--smooth", "hard:1"], 2, "gaussian:SECONDS"),
-        (["convert", "take.csv", "-o", "a.csv", "--rate", "0"], 2, "--rate: above 0"),
+        (["convert", "take.csv", "-o", "a.csv", "--rate", "0"], 2, "--rate: 0.01 to 1e+06"),
         (["convert", "take.csv", "-o", "a.csv", "--neutral", "900"], 1, "frames from 0 to 89"),
         (["convert", "take.csv", "-o", "a.csv", "--mapping", "no.toml"], 1, "no.toml: cannot read"),
         (

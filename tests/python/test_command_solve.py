@@ -2,6 +2,7 @@
 """The command `risorius solve`, and the files that it reads."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -95,6 +96,8 @@ def test_alembic_needs_its_package_or_is_read(take, tmp_path):
         ({"points": np.zeros((2, 196, 3))}, r"vertices of shape \[F, V, 3\]"),
         ({"vertices": np.zeros((2, 3))}, r"vertices of shape \[F, V, 3\]"),
         ({"vertices": np.full((2, 196, 3), np.inf)}, "finite vertices"),
+        ({"vertices": np.full((2, 196, 3), 1e38)}, "vertices up to 1e.09"),
+        ({"vertices": np.full((2, 196, 3), 1e300)}, "finite vertices"),
         ({"vertices": np.zeros((2, 196, 3)), "neutral": np.zeros((4, 3))}, "neutral of shape"),
         ({"vertices": np.zeros((2, 196, 3)), "rate": 0.0}, "a rate above 0"),
         ({"vertices": np.zeros((2, 196, 3)), "rate": [24.0, 25.0]}, "a rate above 0"),
@@ -149,3 +152,30 @@ def test_errors_are_one_sentence(take, tmp_path, monkeypatch, arguments, code, s
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "out.rzc").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            lambda mesh: np.full_like(mesh.positions, np.nan),
+            "coordinates up to 1e.09 were expected",
+        ),
+        (lambda mesh: 1e30 * np.asarray(mesh.positions), "coordinates up to 1e.09 were expected"),
+        (None, "a face with meshes was expected"),
+    ],
+)
+def test_a_face_that_cannot_be_computed_with_is_one_sentence(tmp_path, change, said):
+    dna = small_face()
+    if change is None:
+        dna = risorius.load(dna.to_bytes(), layers="behavior")
+    else:
+        mesh = dna.meshes[0]
+        mesh.positions = change(mesh)
+        dna.meshes = [mesh]
+    dna.save(tmp_path / "face.dna")
+    np.savez(tmp_path / "take.npz", vertices=np.zeros((2, 196, 3)))
+    words = ("solve", tmp_path / "face.dna", tmp_path / "take.npz", "-o", tmp_path / "out.rzc")
+    done = run(*words, text=True)
+    assert done.returncode == 1
+    assert re.search(f"face.dna: .*{said}", done.stderr)

@@ -261,7 +261,7 @@ def test_facts(tmp_path, capsys):
         (["-o", "out.txt"], ".npz or .csv"),
         (["-o", "out.csv", "--compress"], "--compress"),
         (["-o", "out.npz", "--lod", "2"], "0 to 1"),
-        (["-o", "out.npz", "--lod", "-1"], "0 to 1"),
+        (["-o", "out.npz", "--lod", "-1"], "--lod: 0 to"),
         (["-o", "out.npz", "--rate", "0"], "'0'"),
         (["-o", "out.npz", "--rate", "nan"], "'nan'"),
         (["-o", "out.npz", "--frames", "3"], "A:B"),

@@ -242,7 +242,7 @@ def test_check_names_what_a_rig_lacks():
         ("rows = 1", "rows: a table was expected, found 1"),
         ("[rows]\na = 1", r"rows.a: .* was expected, found 1"),
         ("[rows]\na = { b = true }", "rows.a.b: a number was expected, found True"),
-        ("[rows]\na = { b = nan }", "rows.a.b: a number was expected, found nan"),
+        ("[rows]\na = { b = nan }", "rows.a.b: a finite number was expected, found nan"),
         (
             '[rows]\na = { "*b" = 1.0 }',
             r"rows.a: a \* was expected at the end of a control, or in both",

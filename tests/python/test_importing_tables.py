@@ -346,7 +346,9 @@ def test_a_frame_number_beyond_the_rate_is_named(tmp_path):
 
 def test_a_file_too_large_is_not_read(tmp_path, monkeypatch):
     monkeypatch.setattr("risorius.importing.source.MAX_BYTES", 100)
-    with pytest.raises(importing.AnimationFileError, match="100 bytes at most was expected, found"):
+    with pytest.raises(
+        importing.AnimationFileError, match="at most 100 bytes were expected, found"
+    ):
         read(tmp_path, take())
 
 

@@ -13,7 +13,7 @@ import sys
 import time
 
 import pytest
-from conftest import GOLDEN
+from conftest import GOLDEN, PROJECT
 
 CORE = str(GOLDEN / "core.dna")
 COMMANDS = {
@@ -66,6 +66,29 @@ def test_an_interrupt_is_a_sentence_and_leaves_the_old_file(tmp_path):
             assert (name, process.returncode, said) == (name, 130, "risorius: interrupted\n")
             assert sorted(os.listdir(folder)) == sorted([place.name, *([out] if out else [])])
             assert out is None or (folder / out).read_text() == "old"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("heard", [True, False])
+def test_an_interrupt_is_a_sentence_while_the_package_is_imported(tmp_path, heard):
+    (tmp_path / "risorius").mkdir()
+    (tmp_path / "risorius" / "__init__.py").write_text(
+        "print('importing', flush=True)\ntry:\n    input()\nexcept BaseException:\n    pass\n"
+    )
+    (tmp_path / "risorius" / "cli.py").write_text("def main():\n    print('run')\n    return 3\n")
+    program = "import sys; from risorius_command import main; sys.exit(main())"
+    paths = os.pathsep.join([str(tmp_path), str(PROJECT / "native" / "python")])
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": paths},
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=None if heard else lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),  # noqa: PLW1509
+    )  # fmt: skip
+    assert process.stdout.readline() == "importing\n"
+    process.send_signal(signal.SIGINT)
+    if heard:
+        assert (process.wait(), process.stderr.read()) == (130, "risorius: interrupted\n")
+    out, error = process.communicate("\n")
+    assert heard or (process.returncode, out, error) == (3, "run\n", "")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="a device that is full")

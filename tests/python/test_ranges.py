@@ -148,7 +148,7 @@ def test_the_file_is_for_editing(folder, tmp_path, capsys):
     table = capsys.readouterr().out
     assert "control" in table and "left as captured" in table  # noqa: PT018
     assert "CTRL_expressions.jawFwd" in table and "hardly moves" in table  # noqa: PT018
-    assert "9 controls stretched" in table
+    assert "5 controls stretched" in table
     text = out.read_text()
     assert text == ranges_text(load_ranges(out))
     assert 'source = "rom.csv"' in text

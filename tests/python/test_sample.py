@@ -512,8 +512,8 @@ def test_a_spec_says_what_the_rig_is_to_be(tmp_path, asked):
     ("text", "sentence"),
     [
         ('[source]\ndna = "x.dna"', "source: a person of the sample has its own"),
-        ("[joints]\ncount = true", "joints.count: True is of another kind"),
-        ("[correctives]\nmost = -1", "correctives.most: 0 or more was expected"),
+        ("[joints]\ncount = true", "joints.count: a whole number was expected, found True"),
+        ("[correctives]\nmost = -1", "correctives.most: 0 to 65535 was expected"),
         (None, "--spec: full or a .toml was expected, found "),
     ],
 )

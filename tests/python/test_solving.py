@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Drags on a skin, handles, and curves from a mesh that moves."""
 
+import math
+
 import numpy as np
 import pytest
 import risorius
@@ -488,11 +490,50 @@ def test_a_solve_can_be_cancelled(face):
         (np.zeros((0, 196, 3)), {}, "frames: as many"),
         ({4: np.zeros((2, 196, 3))}, {}, "frames: meshes below 1 were expected, found 4"),
         ({}, {}, "frames: one mesh at least"),
-        (np.zeros((2, 196, 3)), {"rate": 0}, "rate: a number above 0 was expected, found 0"),
-        (np.zeros((2, 196, 3)), {"smooth": -1}, "smooth: a number from 0"),
+        (np.zeros((2, 196, 3)), {"rate": 0}, "rate: 0.01 to 1e.06 was expected, found 0"),
+        (np.zeros((2, 196, 3)), {"smooth": -1}, "smooth: 0 to 1e.09 was expected"),
         (np.zeros((2, 196, 3)), {"neutral": np.zeros((5, 3))}, "neutral: "),
     ],
 )
 def test_frames_that_make_no_sense_are_one_sentence(face, frames, change, said):
     with pytest.raises(risorius.RisoriusError, match=said):
         risorius.solve_clip(face[1], frames, **{"rate": 30, **change})
+
+
+HUGE = 10**400
+ODD = {
+    "raw": (1e39, HUGE, "a"),
+    "points": ([(2**70, 0)], [(0, 1e38)], [(0, 0.5)], [3], "a"),
+    "targets": ([[1e39, 0, 0]], [[HUGE, 0, 0]], "a"),
+    "axes": ([[[HUGE, 0, 0]]],),
+    "weights": (2**70 * 10**300,),
+    "highest": (1e39, 1e308),
+    "partners": ([2**70],),
+    "opposites": ([(2**70, 0)],),
+    "smallest": (math.nan, 1e308, HUGE, -1),
+    "rounds": (-1, 1e38, 2**70),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_numbers_of_a_drag_are_of_any_size_and_refused(face, name):
+    for odd in ODD[name]:
+        given = {
+            "raw": np.zeros(face[1].control_count),
+            "points": [(0, 3)],
+            "targets": np.zeros((1, 3)),
+        }
+        given[name] = odd
+        with pytest.raises(risorius.RisoriusError, match=rf"^({name}|points\[0\]): "):
+            risorius.solve_drag(face[1], **given)
+
+
+@pytest.mark.parametrize(
+    ("name", "odd"),
+    [("threads", -1), ("threads", 2**70), ("rate", 2**70), ("start", HUGE), ("sparse", math.nan),
+     ("smooth", -1), ("most_points", 0), ("frames", 1e39), ("frames", {2**70: 0})],
+)  # fmt: skip
+def test_numbers_of_a_clip_are_of_any_size_and_refused(face, name, odd):
+    given = {"frames": np.zeros((2, face[1].vertex_counts[0], 3)), "rate": 30.0} | {name: odd}
+    with pytest.raises(risorius.RisoriusError, match=rf"^{name}: "):
+        risorius.solve_clip(face[1], given.pop("frames"), **given)

@@ -90,25 +90,28 @@ def make_joint_rig(
     names = list(work.dna.joint_names)[len(dna.joint_names) :]
     combinations = _combine(work, made.options, regions, _part(progress, 0.8, 1.0))
     made.meshes = list(work.dna.meshes)
-    tallest = max(
-        (
-            np.ptp(np.asarray(dna.meshes[m].positions, np.float64)[:, 1])
-            for m in listed_meshes(dna, 0)
-        ),
-        default=0,
-    )
     return JointRig(
         work.dna,
         names,
         made.errors,
         made.levels(),
-        float(tallest) * MM.get(dna.translation_unit, 10.0),
+        _height(dna) * MM.get(dna.translation_unit, 10.0),
         count_deltas(dna.meshes),
         count_deltas(work.dna.meshes),
         work.columns,
         combinations,
         reference_of(work, fit, made),
     )
+
+
+def _height(dna: Dna) -> float:
+    """Of the tallest mesh of LOD 0; of a mesh without height its larger other side."""
+    sizes = [
+        np.ptp(np.asarray(dna.meshes[m].positions, np.float64), axis=0)
+        for m in listed_meshes(dna, 0)
+    ]
+    tallest = max((float(size[1]) for size in sizes), default=0.0)
+    return tallest or max((float(size.max()) for size in sizes), default=0.0)
 
 
 def find_reference(

@@ -271,6 +271,7 @@ def _no_errors(vertices: int, expressions: list[str]) -> MeshErrors:
 
 def _set_skin(mesh: Mesh, rows: Doubles) -> None:
     kept = np.where(rows > _LEAST_WEIGHT, rows, 0)
+    kept[~kept.any(axis=1), 0] = 1  # a vertex that hangs on nothing goes with the root
     kept /= kept.sum(axis=1, keepdims=True)
     vertex, joint = np.nonzero(kept)
     counts = (kept > 0).sum(axis=1)

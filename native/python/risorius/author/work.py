@@ -106,6 +106,7 @@ class Work:
 def begin(dna: Dna) -> Work:
     if not dna.meshes or not dna.joint_names:
         raise ArgumentError("a face with meshes and at least one joint was expected")
+    require_sizes(dna)
     count = sk.column_count(dna)
     deltas = sk.column_deltas(dna, count)
     if np.any(deltas[..., 6:9]):
@@ -123,6 +124,33 @@ def begin(dna: Dna) -> Work:
     work.wanted = {m: displacements(work, mesh) for m, mesh in enumerate(dna.meshes)}
     work.head = _head(work)
     return work
+
+
+def require_sizes(dna: Dna) -> None:
+    """Refuse a face whose meshes cannot be computed with.
+
+    Args:
+        dna: of any file.
+
+    Raises:
+        ArgumentError: no mesh, all of its vertices in one point, coordinates that are not finite
+            or beyond FARTHEST, whose squares leave the numbers.
+    """
+    if not dna.meshes:
+        raise ArgumentError("a face with meshes was expected")
+    spread = 0.0
+    for name, mesh in zip(dna.mesh_names, dna.meshes, strict=False):
+        points = np.asarray(mesh.positions, np.float64)
+        moved = [np.asarray(t.deltas, np.float64) for t in mesh.blend_shape_targets]
+        largest = max((float(np.abs(x).max(initial=0.0)) for x in (points, *moved)), default=0.0)
+        if not largest <= sk.FARTHEST:
+            raise ArgumentError(
+                f"mesh {name}: coordinates up to {sk.FARTHEST:g} were expected, found {largest:g}"
+            )
+        if len(points):
+            spread = max(spread, float(np.ptp(points, axis=0).max()))
+    if not spread:
+        raise ArgumentError("a mesh of some size was expected, found vertices in one point")
 
 
 def _column_name(dna: Dna, column: int) -> str:

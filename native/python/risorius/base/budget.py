@@ -50,7 +50,9 @@ class Budget:
         Raises:
             BudgetError: fewer are left.
         """
-        self.bytes = _left(self.bytes, self._bytes, count, f"{place}: {count:,.0f} bytes", "taken")
+        self.bytes = _left(
+            self.bytes, self._bytes, count, f"{place}: {_amount(count)} bytes", "taken"
+        )
 
     def work(self, count: float, place: str) -> None:
         """Take `count` steps of the budget, before they are done.
@@ -62,7 +64,14 @@ class Budget:
         Raises:
             BudgetError: fewer are left.
         """
-        self.steps = _left(self.steps, self._steps, count, f"{place}: {count:,.0f} steps", "done")
+        self.steps = _left(
+            self.steps, self._steps, count, f"{place}: {_amount(count)} steps", "done"
+        )
+
+
+def _amount(count: float) -> str:
+    """A file may state whole numbers that no float holds; more than the world has is enough."""
+    return f"{min(count, 1 << 80) if isinstance(count, int) else count:,.0f}"
 
 
 def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:

@@ -133,10 +133,15 @@ def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
 
 
 def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
-    """The begin and the end of a file, enough for `kind_of`; nothing of one that cannot be read."""
+    """The begin and the end of a file, enough for `kind_of`; nothing of what is no plain file.
+
+    A pipe can be read once only, and opening it may wait for ever.
+    """
     if isinstance(source, bytes | bytearray | memoryview):
         return bytes(source[:_PART]) + bytes(source[-_PART:])
     try:
+        if not os.path.isfile(source):
+            return b""
         with open(source, "rb") as file:
             begin = file.read(_PART)
             file.seek(max(file.seek(0, os.SEEK_END) - _PART, 0))

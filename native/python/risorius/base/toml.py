@@ -6,12 +6,12 @@ from __future__ import annotations
 import os
 import re
 import tomllib
-from pathlib import Path
 from typing import Any
 
+from . import reading
 from .errors import ArgumentError, RisoriusError
 
-MOST_BYTES = 16 << 20
+MOST_BYTES = reading.TEXT
 DEEPEST = 64
 # Dotted keys may have so many parts: the parser's time grows with the square of their number.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
@@ -48,9 +48,23 @@ def parse(text: str) -> dict[str, Any]:
 def read(path: str | os.PathLike[str]) -> dict[str, Any]:
     """A TOML file. Raises: ValueError with the file's name; OSError."""
     try:
-        return parse(Path(path).read_text(encoding="utf-8"))
-    except (TomlError, UnicodeDecodeError) as error:
+        return parse(text_of(path))
+    except TomlError as error:
         raise ArgumentError(f"{os.fspath(path)}: a TOML file was expected: {error}") from None
+
+
+def text_of(path: str | os.PathLike[str]) -> str:
+    """The text of a TOML file, with or without a byte order mark.
+
+    Raises:
+        TomlError: no UTF-8; without the file's name.
+        ReadingError: larger than MOST_BYTES, or a device.
+        OSError: it cannot be read.
+    """
+    try:
+        return reading.read_file(path, MOST_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TomlError(f"UTF-8 text was expected (byte {error.start})") from None
 
 
 def _is_deep(table: dict[str, Any]) -> bool:

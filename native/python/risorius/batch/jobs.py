@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import glob
-import math
 import os
 import string
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from typing import Any, NamedTuple
 from risorius import importing
 from risorius.base import toml
 from risorius.base.errors import RisoriusError
+from risorius.base.given import shown
 
 from ..baking.bake import DEFAULT_PARTS, KINDS
 from ..baking.face import PARTS
@@ -105,7 +105,7 @@ class _Table:
             return default
         value = self._values[key]
         if not check(value):
-            raise self.error(key, f"{expected} was expected, found {_shown(value)}")
+            raise self.error(key, f"{expected} was expected, found {shown(value)}")
         return value
 
     def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
@@ -117,9 +117,9 @@ class _Table:
         out = [value] if isinstance(value, str) else list(value)
         for text in out:
             if "\0" in text or not text:
-                raise self.error(key, f"text was expected, found {_shown(text)}")
+                raise self.error(key, f"text was expected, found {shown(text)}")
             if out.count(text) > 1:
-                raise self.error(key, f"each once was expected, found {_shown(text)} twice")
+                raise self.error(key, f"each once was expected, found {shown(text)} twice")
         return out
 
     def choice(
@@ -130,17 +130,12 @@ class _Table:
         for text in texts:
             if text not in choices:
                 raise self.error(
-                    key, f"some of {', '.join(choices)} were expected, found {_shown(text)}"
+                    key, f"some of {', '.join(choices)} were expected, found {shown(text)}"
                 )
         return tuple(choice for choice in choices if choice in texts)
 
     def flag(self, key: str) -> bool:
         return bool(self.take(key, "true or false", lambda v: isinstance(v, bool), False))
-
-
-def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _all_of(value: Any, kind: type) -> bool:
@@ -155,10 +150,10 @@ def read_jobs(source: Path) -> Plan:
             nothing, two jobs would write one file.
     """
     try:
-        values = toml.parse(source.read_bytes().decode())
+        values = toml.parse(toml.text_of(source))
     except OSError as error:
         raise JobsError(f"{source}: cannot read it: {error.strerror}") from error
-    except (toml.TomlError, UnicodeDecodeError) as error:
+    except toml.TomlError as error:
         raise JobsError(f"{source}: not TOML: {error}") from error
     top = _Table(source, "", values, _TOP_KEYS)
     base = Path(os.path.abspath(source)).parent
@@ -193,7 +188,7 @@ def _jobs_of(table: _Table, base: Path, output: Path) -> Iterator[Job]:
         lambda v: _all_of(v, int) and v and min(v) >= 0 and max(v) < 1 << 16, [0],
     )  # fmt: skip
     if len(set(lods)) != len(lods):
-        raise table.error("lods", f"each LOD once was expected, found {_shown(lods)}")
+        raise table.error("lods", f"each LOD once was expected, found {shown(lods)}")
     pattern = table.take("name", "a pattern", _is_name, DEFAULT_NAME)
     _check_pattern(table, pattern)
     kinds = table.choice("write", KINDS, ())
@@ -211,7 +206,7 @@ def _jobs_of(table: _Table, base: Path, output: Path) -> Iterator[Job]:
 def _options(table: _Table, base: Path) -> Options:
     rate = table.take(
         "rate", "frames per second above 0",
-        lambda v: type(v) in (int, float) and math.isfinite(v) and 0 < v <= 1e6, 0.0,
+        lambda v: type(v) in (int, float) and 0 < v <= 1e6, 0.0,
     )  # fmt: skip
     frames = table.take(
         "frames", "[first, end] with first below end",
@@ -284,10 +279,10 @@ def _check_pattern(table: _Table, pattern: str) -> None:
     try:
         pieces = list(string.Formatter().parse(pattern))
     except ValueError as error:
-        raise table.error("name", f"{expected}found {_shown(pattern)}: {error}") from None
+        raise table.error("name", f"{expected}found {shown(pattern)}: {error}") from None
     for _, field, form, conversion in pieces:
         if field is not None and (field not in FIELDS or form or conversion):
-            raise table.error("name", f"{expected}found {{{field}}} in {_shown(pattern)}")
+            raise table.error("name", f"{expected}found {{{field}}} in {shown(pattern)}")
 
 
 def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
@@ -308,16 +303,15 @@ def _folder_name(folder: str) -> str:
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
     """A path below the output folder. A field that is empty leaves no folder."""
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
-    if not parts or ".." in parts or name.startswith(("/", "\\")):
-        raise table.error(
-            key, f"a name inside the output folder was expected, found {_shown(name)}"
-        )
+    rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
+    if not parts or ".." in parts or rooted:
+        raise table.error(key, f"a name inside the output folder was expected, found {shown(name)}")
     for part in parts:
         if not is_file_name(part.lstrip(".")):
             raise table.error(
                 key,
                 f"names of files as every system takes them, of {LONGEST} bytes at most, were "
-                f"expected, found {_shown(part)}",
+                f"expected, found {shown(part)}",
             )
     return output.joinpath(*parts)
 

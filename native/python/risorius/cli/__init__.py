@@ -13,6 +13,9 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
+
+import numpy as np
 
 from .. import __version__
 from ..base.errors import RisoriusError, sentence
@@ -31,6 +34,7 @@ from . import eval as evaluate
 from .faces import author, mix, sample, solve
 from .files import CommandLineError
 from .pages import plot, web
+from .terminal import obeyed_by_nobody
 
 INTERRUPTED = 130
 
@@ -40,6 +44,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
             stream.reconfigure(errors="backslashreplace")
+    # What leaves the numbers is refused where it counts; NumPy would name our lines and no file.
+    with obeyed_by_nobody(), np.errstate(all="ignore"):
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     try:
         args = parse(arguments)
         code = int(args.func(args))
@@ -70,9 +80,23 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that leaves to `main` what is wrong with the value of one option."""
+
+    def error(self, message: str) -> NoReturn:
+        if message.startswith("argument "):
+            raise CommandLineError(message.removeprefix("argument "))
+        super().error(message)
+
+
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """What was typed; `func` is the command. Raises: SystemExit: it makes no sense."""
-    parser = argparse.ArgumentParser(prog="risorius", description="Face rigs from DNA files.")
+    """What was typed; `func` is the command.
+
+    Raises:
+        CommandLineError: an option has no such value.
+        SystemExit: it makes no sense as a whole; the usage was printed.
+    """
+    parser = _Parser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", required=True)
     commands = (

@@ -17,7 +17,7 @@ from risorius.batch.journal import Journal
 from risorius.batch.running import Report, closing_line, pending
 from risorius.batch.running import run as run_plan
 
-from .files import CommandLineError
+from .files import whole_number
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -32,7 +32,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("jobs", type=Path, metavar="JOBS.toml", help="see docs/batch.md")
     where = parser.add_mutually_exclusive_group()
     where.add_argument(
-        "--workers", type=int, metavar="N", help="processes of this machine (as many as cores)"
+        "--workers",
+        type=whole_number(1, 1024),
+        metavar="N",
+        help="processes of this machine (as many as cores)",
     )
     where.add_argument(
         "--scheduler",
@@ -51,8 +54,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    if args.workers is not None and not 1 <= args.workers <= 1024:
-        raise CommandLineError(f"--workers: 1 to 1024 were expected, found {args.workers}")
     try:
         plan = read_jobs(args.jobs)
         if args.dry_run:

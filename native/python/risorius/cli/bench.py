@@ -84,7 +84,7 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
 
 def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
     paths = []
-    with np.load(source) as arrays:
+    with open(source, "rb") as opened, np.load(opened) as arrays:
         for name in FRAMES:
             if name not in arrays:
                 raise InputError(f"{source}: an array {name!r} was expected")

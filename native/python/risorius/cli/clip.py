@@ -13,8 +13,9 @@ import risorius
 from risorius import Clip, importing
 from risorius.importing import process
 
+from ..base.given import GivenError, finite_text, shown, whole_text
 from ..base.words import counted
-from .files import CommandLineError, refuse_same_file, require_writable
+from .files import CommandLineError, number, refuse_same_file, require_writable
 from .ranges import add_learn, with_ranges
 
 OUTPUTS = (".rzc", ".csv", ".json")
@@ -101,8 +102,12 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--mirror", action="store_true", help="left for right")
     parser.add_argument("--cut", metavar="A:B", help="from A to B seconds")
-    parser.add_argument("--rate", type=float, metavar="FPS", help="frames a second of OUT")
-    parser.add_argument("--shift", type=float, default=0.0, metavar="S", help="seconds later")
+    parser.add_argument(
+        "--rate", type=number(0.01, 1e6), metavar="FPS", help="frames a second of OUT"
+    )
+    parser.add_argument(
+        "--shift", type=number(-1e9, 1e9), default=0.0, metavar="S", help="seconds later"
+    )
     parser.add_argument(
         "--report", action="store_true", help="print what was mapped and what was not, to stdout"
     )
@@ -116,12 +121,15 @@ def _add_input(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--input-rate",
-        type=float,
+        type=number(0.01, 1e6),
         metavar="FPS",
         help="frames a second of IN, where its time is a frame number or is not there",
     )
     parser.add_argument(
-        "--timecode-rate", type=float, metavar="FPS", help="of timecodes that do not tell it"
+        "--timecode-rate",
+        type=number(0.01, 1e6),
+        metavar="FPS",
+        help="of timecodes that do not tell it",
     )
     parser.add_argument(
         "--time-unit",
@@ -218,7 +226,7 @@ def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
     except ValueError as error:
         raise CommandLineError(f"--gain, --offset: {error}") from error
     if args.neutral is not None:
-        first, last = _pair(args.neutral, "--neutral", int)
+        first, last = _pair(args.neutral, "--neutral", whole_text)
         steps.append(lambda clip: process.calibrate(clip, int(first), int(last)))
     if gains or offsets:
         steps.append(lambda clip: process.adjust(clip, gains, offsets))
@@ -231,11 +239,9 @@ def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
     if args.mirror:
         steps.append(process.mirror)
     if args.cut is not None:
-        start, end = _pair(args.cut, "--cut", float)
+        start, end = _pair(args.cut, "--cut", finite_text)
         steps.append(lambda clip: process.cut(clip, start, end))
     if args.rate is not None:
-        if not 0.0 < args.rate < 1e6:
-            raise CommandLineError(f"--rate: above 0 was expected, found {args.rate:g}")
         steps.append(lambda clip: process.resample(clip, args.rate))
     if args.shift:
         steps.append(lambda clip: process.shift(clip, args.shift))
@@ -247,25 +253,25 @@ def _smoothing(text: str) -> Callable[[Clip], Clip]:
     runs: dict[str, Callable[[Clip, float], Clip]]
     runs = {"": process.smooth, "gaussian": process.gaussian, "one-euro": process.one_euro}
     try:
-        width = float(amount)
-    except ValueError:
-        width = np.nan
-    if kind not in runs or not 0.0 < width < np.inf:
+        width = finite_text(amount, 0.0, above=True)
+        if kind not in runs:
+            raise GivenError(f"found {shown(kind)}")
+    except GivenError as error:
         raise CommandLineError(
-            f"--smooth: seconds, gaussian:SECONDS or one-euro:HZ was expected, found {text!r}"
-        )
+            f"--smooth: seconds, gaussian:SECONDS or one-euro:HZ was expected: {error}"
+        ) from None
     return lambda clip: runs[kind](clip, width)
 
 
-def _pair(text: str, option: str, number: type[int] | type[float]) -> tuple[float, float]:
+def _pair(text: str, option: str, number: Callable[[str, int], float]) -> tuple[float, float]:
     first, colon, last = text.partition(":")
     try:
-        start = number(first)
-        end = number(last) if colon else start
-    except ValueError:
-        raise CommandLineError(f"{option}: A:B was expected, found {text!r}") from None
-    if not 0 <= start <= end:
-        raise CommandLineError(f"{option}: A:B with 0 <= A <= B was expected, found {text!r}")
+        start = number(first, 0)
+        end = number(last, 0) if colon else start
+    except GivenError as error:
+        raise CommandLineError(f"{option}: A:B was expected: {error}") from None
+    if not start <= end:
+        raise CommandLineError(f"{option}: A:B with 0 <= A <= B was expected, found {shown(text)}")
     return start, end
 
 

@@ -25,6 +25,7 @@ from .files import (
     refuse_same_file,
     require_writable,
     summary,
+    whole_number,
 )
 
 _NEWEST = 8
@@ -63,7 +64,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         default="preserve",
         help="layers that Risorius or the version does not know (default: preserve)",
     )
-    parser.add_argument("--indent", type=int, metavar="N", help="spaces per level of JSON, 0 to 8")
+    parser.add_argument(
+        "--indent", type=whole_number(0, 8), metavar="N", help="spaces per level of JSON, 0 to 8"
+    )
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
     _add_system(parser.add_argument_group("coordinates of the result (default: those of INPUT)"))
     parser.set_defaults(func=run)
@@ -103,8 +106,6 @@ def complain(args: argparse.Namespace) -> None:
     """Raises CommandLineError for what is wrong before the file is looked at."""
     if args.indent is not None and args.output_kind != "json":
         raise CommandLineError("--indent: only JSON is indented")
-    if args.indent is not None and not 0 <= args.indent <= 8:
-        raise CommandLineError(f"--indent: 0 to 8 was expected, found {args.indent}")
     if not args.force:
         refuse_same_file(args.input, args.output)
     require_writable(args.output)

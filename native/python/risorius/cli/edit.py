@@ -13,6 +13,7 @@ from typing import Any
 import risorius
 
 from ..base import toml
+from ..base.reading import TEXT
 from ..base.words import counted
 from ..rigs import edit
 from .convert import json_text, version_of, warnings_as_lines, write
@@ -21,11 +22,13 @@ from .files import (
     InputError,
     kind_of,
     label,
+    number,
     read,
     read_bytes,
     refuse_same_file,
     require_writable,
     summary,
+    whole_number,
 )
 
 _DESCRIPTION = """\
@@ -64,7 +67,7 @@ def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
     )
     parser.add_argument(
         "--foreign-share",
-        type=float,
+        type=number(0.0, 1.0),
         default=0.25,
         metavar="S",
         help="a control is foreign to a region of which it moves at most this share (0.25)",
@@ -76,11 +79,19 @@ def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
         "drives the joints, as for joints that the file leaves out)",
     )
     parser.add_argument(
-        "--combinations", type=int, default=200, metavar="N", help="random poses to compare (200)"
+        "--combinations",
+        type=whole_number(0, 1_000_000),
+        default=200,
+        metavar="N",
+        help="random poses to compare (200)",
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of those poses")
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, metavar="N", help="of those poses"
+    )
     parser.add_argument("--plot", metavar="PICTURE", help="before and after, .png or .svg")
-    parser.add_argument("--dpi", type=int, default=150, help="of the picture, 40 to 600")
+    parser.add_argument(
+        "--dpi", type=whole_number(40, 600), default=150, help="of the picture, 40 to 600"
+    )
     parser.add_argument("--json", action="store_true", help="the report for a program")
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
     parser.set_defaults(func=run)
@@ -109,16 +120,6 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(
             f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"
         )
-    if not 40 <= args.dpi <= 600:
-        raise CommandLineError(f"--dpi: 40 to 600 was expected, found {args.dpi}")
-    if not 0 <= args.combinations <= 1_000_000:
-        raise CommandLineError(
-            f"--combinations: 0 to 1000000 was expected, found {args.combinations}"
-        )
-    if not 0 <= args.seed < 1 << 64:
-        raise CommandLineError(f"--seed: a number from 0 was expected, found {args.seed}")
-    if not 0 <= args.foreign_share <= 1:
-        raise CommandLineError(f"--foreign-share: 0 to 1 was expected, found {args.foreign_share}")
     if not args.force:
         refuse_same_file(args.input, args.output)
     require_writable(args.output, args.plot)
@@ -131,7 +132,7 @@ def read_regions(name: str) -> edit.Regions:
     Raises:
         InputError: not JSON or TOML, or of another form.
     """
-    data = read_bytes(name)
+    data = read_bytes(name, TEXT)
     try:
         text = data.decode()
         found = toml.parse(text) if name.lower().endswith(".toml") else json.loads(text)

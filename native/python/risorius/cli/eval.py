@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,10 @@ import numpy.typing as npt
 
 import risorius
 from risorius import explain
+from risorius.base.given import GivenError, finite_text
 
 from . import eval_clip
-from .files import CommandLineError
+from .files import CommandLineError, whole_number
 
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
 _NOISE = 1e-9  # cm, m, degrees, radians or of a size: too small to be visible
@@ -54,10 +54,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "most, and which control has which part in it",
     )
     parser.add_argument(
-        "--top", type=int, default=10, metavar="N", help="lines of each list of --explain (10)"
+        "--top",
+        type=whole_number(0, 1_000_000),
+        default=10,
+        metavar="N",
+        help="lines of each list of --explain (10)",
     )
     parser.add_argument("--gui", action="store_true", help="the names are of GUI controls")
-    parser.add_argument("--lod", type=int, default=0, metavar="N", help="0 is the finest (default)")
+    parser.add_argument(
+        "--lod",
+        type=whole_number(0, 65_535),
+        default=0,
+        metavar="N",
+        help="0 is the finest (default)",
+    )
     parser.add_argument("--json", action="store_true", help="for a program")
     eval_clip.add_options(parser)
     parser.set_defaults(func=run)
@@ -89,11 +99,9 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
         except explain.UnknownControlError as error:
             raise CommandLineError(str(error)) from None
         try:
-            value = float(number)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value) or abs(value) > np.finfo(np.float32).max:
-            raise CommandLineError(f"{name}: a number was expected, found {number!r}")
+            value = finite_text(number)
+        except GivenError as error:
+            raise CommandLineError(f"{name}: {error}") from None
         for control, factor in meaning.controls.items():
             values[index[control]] = value * factor
         if not meaning.is_exact:
@@ -225,8 +233,6 @@ def run_pose(args: argparse.Namespace) -> int:
     rig = risorius.Rig(dna)
     if not 0 <= args.lod < max(1, rig.lod_count):
         raise CommandLineError(f"--lod: 0 to {max(1, rig.lod_count) - 1} was expected")
-    if args.top < 0:
-        raise CommandLineError("--top: 0 or more was expected")
     gui = None
     if args.gui:
         names = rig.gui_control_names

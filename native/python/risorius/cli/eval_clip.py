@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from risorius.baking.clips import load_performance
 from risorius.baking.face import PARTS, load_face, prepared
 from risorius.baking.progress import Progress
 from risorius.base.errors import ArgumentError
+from risorius.base.given import finite_text, shown, whole_text
 from risorius.files import fileio
 
 from ..base.words import counted
@@ -64,12 +64,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def parse_frames(text: str) -> tuple[int | None, int | None]:
     """ "A:B" -> (A, B). Raises: ValueError."""
     first, colon, end = text.partition(":")
-    if not (colon and all(t == "" or (t.isascii() and t.isdigit()) for t in (first, end))):
-        raise ArgumentError(f"A:B was expected, e.g. 0:240, found {text!r}")
-    out = (int(first) if first else None, int(end) if end else None)
-    if out[1] is not None and (out[0] or 0) >= out[1]:
-        raise ArgumentError(f"A:B with A below B was expected, found {text!r}")
-    return out
+    if not colon:
+        raise ArgumentError(f"A:B was expected, e.g. 0:240, found {shown(text)}")
+    begin = whole_text(first, 0) if first else None
+    last = whole_text(end, 0) if end else None
+    if last is not None and (begin or 0) >= last:
+        raise ArgumentError(f"A:B with A below B was expected, found {shown(text)}")
+    return begin, last
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
@@ -84,13 +85,7 @@ def parse_parts(texts: list[str]) -> tuple[str, ...]:
 
 def parse_rate(text: str) -> float:
     """Frames per second. Raises: ValueError."""
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = math.nan
-    if not 0 < rate <= 1e6:
-        raise ArgumentError(f"frames per second above 0 were expected, found {text!r}")
-    return rate
+    return finite_text(text, 0.01, 1e6)
 
 
 def _option(name: str, parse: Any, text: str | None, default: Any) -> Any:

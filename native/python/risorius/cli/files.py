@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import risorius
-from risorius.base import signatures
+from risorius.base import given, signatures
 from risorius.base.errors import RisoriusError
+from risorius.base.reading import FACE, read_file, read_stream
 from risorius.base.words import counted
 from risorius.files import fileio
 
@@ -30,6 +32,49 @@ class CommandLineError(RisoriusError):
     """What was typed makes no sense."""
 
     code = "command_line"
+
+
+def whole_number(low: int, high: int = given.MOST) -> Callable[[str], int]:
+    """The `type` of an option that takes a whole number.
+
+    Args:
+        low: the least that is allowed.
+        high: the most that is allowed.
+
+    Raises:
+        ArgumentTypeError: the function that it gives, for anything else.
+    """
+
+    def read(text: str) -> int:
+        try:
+            return given.whole_text(text, low, high)
+        except given.GivenError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return read
+
+
+def number(
+    low: float = -given.LARGEST, high: float = given.LARGEST, *, above: bool = False
+) -> Callable[[str], float]:
+    """The `type` of an option that takes a finite number.
+
+    Args:
+        low: the least that is allowed.
+        high: the most that is allowed.
+        above: low itself is not allowed.
+
+    Raises:
+        ArgumentTypeError: the function that it gives, for anything else.
+    """
+
+    def read(text: str) -> float:
+        try:
+            return given.finite_text(text, low, high, above=above)
+        except given.GivenError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return read
 
 
 def label(name: str, standard: str = "<stdin>") -> str:
@@ -117,14 +162,21 @@ def require_writable(*names: str | Path | None, parents: bool = False) -> None:
             raise InputError(f"{name}: cannot write it: {error.strerror}") from error
 
 
-def read_bytes(name: str) -> bytes:
+def read_bytes(name: str, most: int = FACE) -> bytes:
     """A file's bytes, or those of the standard input for "-".
+
+    Args:
+        name: as the user typed it.
+        most: bytes that it may have.
 
     Raises:
         InputError: it cannot be read.
+        ReadingError: it is larger, or a device.
     """
     try:
-        return sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
+        if name == "-":
+            return read_stream(sys.stdin.buffer, most, label(name))
+        return read_file(name, most)
     except OSError as error:
         raise InputError(f"{label(name)}: cannot read it: {error.strerror}") from error
 

@@ -23,7 +23,13 @@ from ..live import (
     own_address,
 )
 from ..ranges import load_ranges
-from .files import CommandLineError, InputError, require_suffix, require_writable
+from .files import (
+    InputError,
+    number,
+    require_suffix,
+    require_writable,
+    whole_number,
+)
 
 _KINDS = (".rzc", ".csv")
 
@@ -38,7 +44,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--source", choices=SOURCES, default="livelink", help="default livelink")
     ports = ", ".join(f"{port} for {source}" for source, port in PORTS.items())
-    parser.add_argument("--port", type=int, metavar="N", help=f"default {ports}; 0 for any")
+    parser.add_argument(
+        "--port", type=whole_number(0, 65_535), metavar="N", help=f"default {ports}; 0 for any"
+    )
     parser.add_argument(
         "--everywhere",
         action="store_true",
@@ -51,23 +59,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="as the app names it; it gets a place whoever else sends (default: the first heard)",
     )
     parser.add_argument("--record", type=Path, metavar="OUT", help="clip.rzc or clip.csv")
-    parser.add_argument("--seconds", type=float, metavar="N", help="end after them")
+    parser.add_argument(
+        "--seconds", type=number(0.0, above=True), metavar="N", help="end after them"
+    )
     parser.add_argument(
         "--mapping", default="arkit", metavar="NAME|FILE", help="of names to controls, as TOML"
     )
     parser.add_argument(
         "--range", type=Path, metavar="FILE", help="of the person, from risorius clip learn"
     )
-    parser.add_argument("--gain", type=float, default=1.0, metavar="X", help="on all units")
+    parser.add_argument(
+        "--gain", type=number(-1e6, 1e6), default=1.0, metavar="X", help="on all units"
+    )
     parser.set_defaults(func=run)
 
 
 def complain(args: argparse.Namespace) -> None:
     """Raises CommandLineError for what is wrong before anything is listened to."""
-    if args.port is not None and not 0 <= args.port <= 65535:
-        raise CommandLineError(f"--port: 0 to 65535 was expected, found {args.port}")
-    if args.seconds is not None and not args.seconds > 0.0:
-        raise CommandLineError(f"--seconds: more than 0 was expected, found {args.seconds:g}")
     if args.record is None:
         return
     require_suffix(args.record, _KINDS, "--record")

@@ -10,11 +10,20 @@ from pathlib import Path
 
 from ..anim.clip import Clip
 from ..base import signatures
+from ..base.reading import TEXT
 from ..files import fileio
 from ..importing import writing
 from ..speech import Heard, Phoneme, animate, listen
 from ..speech.listening import confidence
-from .files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+from .files import (
+    CommandLineError,
+    InputError,
+    number,
+    read_bytes,
+    require_suffix,
+    require_writable,
+    whole_number,
+)
 
 _KINDS = (".rzc", ".csv", ".json")
 
@@ -34,11 +43,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     known = parser.add_mutually_exclusive_group()
     known.add_argument("--text", help="what is said")
     known.add_argument("--transcript", metavar="FILE", help="a text file of what is said")
-    parser.add_argument("--rate", type=float, default=60.0, metavar="FPS", help="(default 60)")
     parser.add_argument(
-        "--intensity", type=float, default=1.0, metavar="X", help="of the shapes, 0 to 4"
+        "--rate", type=number(1.0, 1000.0), default=60.0, metavar="FPS", help="(default 60)"
     )
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the blinks")
+    parser.add_argument(
+        "--intensity", type=number(0.0, 4.0), default=1.0, metavar="X", help="of the shapes, 0 to 4"
+    )
+    parser.add_argument(
+        "--seed", type=whole_number(0), default=0, metavar="N", help="of the blinks"
+    )
     parser.add_argument("--no-blinks", action="store_true")
     parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
     parser.add_argument(
@@ -49,7 +62,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before the voice is listened to."""
+    """Raises what is wrong with the names of outputs before the voice is listened to."""
     require_suffix(args.out, _KINDS, "-o")
     require_writable(args.out, args.phonemes)
     if args.text is not None and Path(args.text).is_file():
@@ -58,12 +71,6 @@ def complain(args: argparse.Namespace) -> None:
         )
     if args.phonemes is not None and args.phonemes.resolve() == args.out.resolve():
         raise CommandLineError("--phonemes: another file than that of -o was expected")
-    if not 1.0 <= args.rate <= 1000.0:
-        raise CommandLineError(f"--rate: 1 to 1000 was expected, found {args.rate:g}")
-    if not 0.0 <= args.intensity <= 4.0:
-        raise CommandLineError(f"--intensity: 0 to 4 was expected, found {args.intensity:g}")
-    if args.seed < 0:
-        raise CommandLineError(f"--seed: 0 or more was expected, found {args.seed}")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -83,7 +90,7 @@ def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
     """Raises: InputError, ValueError."""
     said = args.text
     if args.transcript is not None:
-        data = read_bytes(args.transcript)
+        data = read_bytes(args.transcript, TEXT)
         kind = signatures.kind_of(data)
         if kind is not None:
             raise InputError(f"{args.transcript}: text was expected, this is {kind}")

@@ -9,13 +9,14 @@ import re
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
 
 from ..base.budget import Budget
+from ..base.given import GivenError, shown, whole
 from . import named_json
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
@@ -66,7 +67,7 @@ class Document:
         """
         rows = self.json.get(kind)
         if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
-            raise self.fail(place, f"an index of {kind} was expected, found {index!r}")
+            raise self.fail(place, f"an index of {kind} was expected, found {shown(index)}")
         if not 0 <= index < len(rows) or not isinstance(rows[index], dict):
             raise self.fail(place, f"{kind}[{index}] was expected, there are {len(rows)}")
         return rows[index]
@@ -84,9 +85,10 @@ class Document:
             AnimationFileError: something else is there.
         """
         value = table.get(key, default)
-        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-            raise self.fail(f"{place}.{key}", f"a whole number was expected, found {value!r}")
-        return value
+        try:
+            return whole(value, 0)
+        except GivenError as error:
+            raise self.fail(f"{place}.{key}", str(error)) from None
 
     def numbers(self, index: object, place: str) -> Doubles:
         """float64[count] of a scalar accessor; whole numbers as the fractions they stand for.
@@ -107,7 +109,7 @@ class Document:
         accessor = self.item("accessors", index, place)
         at = f"accessors[{index}]"
         kind = accessor.get("componentType")
-        if kind not in _TYPES or accessor.get("type") != "SCALAR":
+        if not _is_key(kind, _TYPES) or accessor.get("type") != "SCALAR":
             raise self.fail(at, "numbers one by one were expected")
         if "sparse" in accessor:
             raise self.fail(at, "an accessor that is not sparse was expected")
@@ -145,8 +147,8 @@ class Document:
         """
         accessor = self.item("accessors", index, place)
         at = f"accessors[{index}]"
-        if accessor.get("type") != kind or accessor.get("componentType") not in _TYPES:
-            raise self.fail(at, f"{kind} was expected, found {accessor.get('type')!r}")
+        if accessor.get("type") != kind or not _is_key(accessor.get("componentType"), _TYPES):
+            raise self.fail(at, f"{kind} was expected, found {shown(accessor.get('type'))}")
         width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[kind]
         dtype = np.dtype(_TYPES[accessor["componentType"]])
         count = self.whole(accessor, "count", at)
@@ -225,10 +227,15 @@ class Document:
         # A glTF may name files in its own folder, and no others on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
-        data = read_bytes(self.path.parent / file)
+        data = read_bytes(self.path.parent / file, found=True)
         # A buffer in a file of its own counts as input; but a short JSON may name that file often.
         self.budget.hold(len(data), place)
         return data
+
+
+def _is_key(value: object, table: Mapping[Any, object]) -> TypeGuard[Any]:
+    """Whether a value of the JSON, which may be a list, stands in a table."""
+    return isinstance(value, int | str) and value in table
 
 
 def is_glb(data: bytes) -> bool:
@@ -452,8 +459,8 @@ def _keys(
     if not isinstance(sampler, dict):
         raise document.fail(place, f"a sampler was expected, found {index!r}")
     way = sampler.get("interpolation", "LINEAR")
-    if way not in _KINDS:
-        raise document.fail(place, f"one of {', '.join(_KINDS)} was expected, found {way!r}")
+    if not _is_key(way, _KINDS):
+        raise document.fail(place, f"one of {', '.join(_KINDS)} was expected, found {shown(way)}")
     times = document.numbers(sampler.get("input"), f"{place}, input")
     document.budget.work(times.size, place)
     if times.size == 0 or (np.diff(times) <= 0.0).any():

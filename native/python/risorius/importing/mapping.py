@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import fnmatch
-import math
 import os
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -24,6 +23,8 @@ from .. import expressions
 from ..anim.clip import Clip
 from ..base import toml
 from ..base.budget import Budget
+from ..base.given import GivenError, finite, flag, shown
+from ..base.reading import ReadingError
 from ..controls import arkit
 from ..controls.regions import expand_sides
 from ..controls.shares import share_of
@@ -311,12 +312,14 @@ def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
     if name in mapping_names():
         return _built_in(name)
     try:
-        text = Path(name).read_bytes().decode("utf-8-sig")
+        text = toml.text_of(name)
     except OSError as error:
         known = ", ".join(mapping_names())
         raise MappingError(name, f"cannot read it: {error.strerror} (built in: {known})") from error
-    except UnicodeDecodeError as error:
-        raise MappingError(name, f"UTF-8 text was expected (byte {error.start})") from error
+    except ReadingError as error:
+        raise MappingError(name, error.what) from error
+    except toml.TomlError as error:
+        raise MappingError(name, str(error)) from error
     return parse_mapping(text, name, Path(name).stem)
 
 
@@ -355,7 +358,10 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         key: _adjustment(key, value, where)
         for key, value in _table(table, "controls", where).items()
     }
-    metadata = {key: str(value) for key, value in _table(table, "metadata", where).items()}
+    metadata = {
+        key: shown(value) if isinstance(value, int) else str(value)
+        for key, value in _table(table, "metadata", where).items()
+    }
     return replace(
         mapping,
         name=_text(table, "name", where) or name,
@@ -365,7 +371,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
         controls={**mapping.controls, **controls},
         strip=(*mapping.strip, *_texts(table, "strip", where)),
         is_loose=_matching(table, mapping.is_loose, where),
-        is_gui=bool(table.get("gui", mapping.is_gui)),
+        is_gui=_flag(table, "gui", mapping.is_gui, where),
         metadata={**mapping.metadata, **metadata},
     )
 
@@ -396,28 +402,35 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
 def _matching(table: Table[str, Any], default: bool, where: str) -> bool:
     value = table.get("matching", "loose" if default else "exact")
     if value not in ("loose", "exact"):
-        raise MappingError(where, f"matching: loose or exact was expected, found {value!r}")
+        raise MappingError(where, f"matching: loose or exact was expected, found {shown(value)}")
     return bool(value == "loose")
+
+
+def _flag(table: Table[str, Any], key: str, default: bool, where: str) -> bool:
+    try:
+        return flag(table.get(key, default))
+    except GivenError as error:
+        raise MappingError(where, f"{key}: {error}") from None
 
 
 def _text(table: Table[str, Any], key: str, where: str) -> str:
     value = table.get(key, "")
     if not isinstance(value, str):
-        raise MappingError(where, f"{key}: text was expected, found {value!r}")
+        raise MappingError(where, f"{key}: text was expected, found {shown(value)}")
     return value
 
 
 def _texts(table: Table[str, Any], key: str, where: str) -> list[str]:
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-        raise MappingError(where, f"{key}: a list of names was expected, found {value!r}")
+        raise MappingError(where, f"{key}: a list of names was expected, found {shown(value)}")
     return value
 
 
 def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
     value = table.get(key, {})
     if not isinstance(value, dict):
-        raise MappingError(where, f"{key}: a table was expected, found {value!r}")
+        raise MappingError(where, f"{key}: a table was expected, found {shown(value)}")
     return value
 
 
@@ -433,7 +446,8 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
     if not isinstance(value, dict):
         raise MappingError(
             where,
-            f"rows.{key}: {{ control = weight }} or an expression was expected, found {value!r}",
+            f"rows.{key}: {{ control = weight }} or an expression was expected, found "
+            f"{shown(value)}",
         )
     if key.count("*") > 1:
         raise MappingError(where, f"rows.{key}: one * at most was expected")
@@ -486,7 +500,7 @@ def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
 def _adjustment(key: str, value: object, where: str) -> Adjustment:
     at = f"controls.{key}"
     if not isinstance(value, dict) or set(value) - {"gain", "offset", "curve"}:
-        raise MappingError(where, f"{at}: gain, offset, curve were expected, found {value!r}")
+        raise MappingError(where, f"{at}: gain, offset, curve were expected, found {shown(value)}")
     points = value.get("curve", [])
     good = isinstance(points, list) and all(isinstance(p, list) and len(p) == 2 for p in points)
     if not good:
@@ -502,9 +516,10 @@ def _adjustment(key: str, value: object, where: str) -> Adjustment:
 
 
 def _number(value: object, at: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise MappingError(where, f"{at}: a number was expected, found {value!r}")
-    return float(value)
+    try:
+        return finite(value)
+    except GivenError as error:
+        raise MappingError(where, f"{at}: {error}") from None
 
 
 def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:

@@ -13,6 +13,7 @@ from ..base import filters
 from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from ..base.filters import OneEuro
+from ..base.given import GivenError, finite_text, shown
 from ..controls import arkit
 from ..controls.shares import part_of, share_of
 from ..controls.sides import mirrored_name
@@ -249,9 +250,9 @@ def parse_amounts(texts: Sequence[str]) -> dict[str, float]:
     for text in texts:
         pattern, equals, amount = text.rpartition("=")
         try:
-            out[pattern] = float(amount)
-        except ValueError:
+            out[pattern] = finite_text(amount)
+        except GivenError:
             equals = ""
-        if not equals or not pattern or not np.isfinite(out[pattern]):
-            raise ArgumentError(f"PATTERN=NUMBER was expected, found {text!r}")
+        if not equals or not pattern:
+            raise ArgumentError(f"PATTERN=NUMBER was expected, found {shown(text)}")
     return out

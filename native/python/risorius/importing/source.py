@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from ..anim.clip import Clip, Event
 from ..base import signatures
+from ..base.reading import ReadingError, read_file
 from .clock.units import COUNT_ROWS
 from .errors import AnimationFileError
 
@@ -45,15 +46,20 @@ class Take:
     notes: list[str] = field(default_factory=list)
 
 
-def read_bytes(path: Path) -> bytes:
-    """Raises: AnimationFileError: missing, unreadable, empty, larger than MAX_BYTES."""
+def read_bytes(path: Path, *, found: bool = False) -> bytes:
+    """The bytes of a file.
+
+    Args:
+        path: of the file.
+        found: another file names it, and nobody typed it: it may be no pipe.
+
+    Raises:
+        AnimationFileError: missing, unreadable, empty, larger than MAX_BYTES, a device.
+    """
     try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise AnimationFileError(
-                str(path), f"a file of {MAX_BYTES} bytes at most was expected, found {size}"
-            )
-        data = path.read_bytes()
+        data = read_file(path, MAX_BYTES, found=found)
+    except ReadingError as error:
+        raise AnimationFileError(str(path), error.what) from error
     except OSError as error:
         raise AnimationFileError(str(path), f"cannot read it: {error.strerror}") from error
     if not data.strip(b"\0 \t\r\n\xef\xbb\xbf"):

@@ -15,6 +15,7 @@ from pathlib import Path
 from .. import Dna
 from ..author.geometry.skeleton import Doubles
 from ..base.errors import ArgumentError
+from ..base.reading import ReadingError, read_file
 from ..files.names import folded, is_file_name
 from ..files.png import png, read_png
 from .hair import without_hair
@@ -22,6 +23,7 @@ from .mix import Mix
 from .regions import Masks
 
 _KEY = "texture:"
+_MOST_BYTES = 1 << 28  # of a picture
 _MASKS = "*_msk.png"  # of wrinkles, which are known by their names alone
 
 
@@ -74,7 +76,7 @@ def mix_textures(
             own.append(name)
     for mask in sorted(texture_folder(paths[most]).glob(_MASKS)):
         data = [_bytes(path, mask.name) for path in paths]
-        files[mask.name] = _mixed(data, whole) or mask.read_bytes()
+        files[mask.name] = _mixed(data, whole) or read_file(mask, _MOST_BYTES, found=True)
     return files, own
 
 
@@ -105,8 +107,8 @@ def _data(parent: Dna, path: Path, key: str) -> bytes | None:
 def _bytes(path: Path, name: str) -> bytes | None:
     """A file beside a DNA file or in its folder of textures, if it is there."""
     for folder in (texture_folder(path), path.parent):
-        with contextlib.suppress(OSError):
-            return (folder / name).read_bytes()
+        with contextlib.suppress(OSError, ReadingError):
+            return read_file(folder / name, _MOST_BYTES, found=True)
     return None
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from .._native import DnaError, Rig, compile_version, rig_block_version
 from ..base import version
+from ..base.reading import FACE, ReadingError, read_file
 from ..files.caches import cache_folder
 from .load import load
 
@@ -41,8 +42,8 @@ def compile_cached(
         ValueError: an unknown option.
     """
     try:
-        data = Path(path).read_bytes()
-    except OSError:  # load() below fails as well, and its error names the file
+        data = read_file(path, FACE)
+    except (OSError, ReadingError):  # load() below fails as well, and its error names the file
         dna = load(path)
         return Rig(dna, precision=precision, rotation=rotation, simd=simd)
     file = Path(cache_dir) if cache_dir is not None else cache_folder() / "rigs"
@@ -51,7 +52,11 @@ def compile_cached(
         return Rig.load(file, trusted=None, simd=simd)
     try:
         dna = load(data)
-    except DnaError:
+    except DnaError as error:
+        if not os.path.isfile(path):  # a pipe gives its bytes once
+            named = DnaError(f"{os.fspath(path)}: {error}")
+            named.code, named.where, named.offset = error.code, error.where, error.offset
+            raise named from None
         dna = load(path)  # names the file
     rig = Rig(dna, precision=precision, rotation=rotation, simd=simd)
     with contextlib.suppress(OSError, DnaError):

@@ -12,6 +12,7 @@ from typing import Any
 
 from ..base import toml
 from ..base.errors import ArgumentError
+from ..base.given import GivenError, finite, shown
 
 Colour = tuple[float, float, float]
 ORIGINS = ("caucasian", "african", "asian")
@@ -101,17 +102,17 @@ class _Reader:
         self.where, self.table = where, dict(table)
 
     def fail(self, key: str, expected: str, found: object) -> ArgumentError:
-        return ArgumentError(f"{self.where}: {key}: {expected} was expected, found {found!r}")
+        return ArgumentError(f"{self.where}: {key}: {expected} was expected, found {shown(found)}")
 
     def take(self, key: str, convert: Callable[[str, Any], Any]) -> dict[str, Any]:
         return {key: convert(key, self.table.pop(key))} if key in self.table else {}
 
     def number(self, low: float, high: float) -> Callable[[str, Any], float]:
         def convert(key: str, value: Any) -> float:
-            real = isinstance(value, int | float) and not isinstance(value, bool)
-            if not real or not low <= value <= high:
-                raise self.fail(key, f"a number from {low:g} to {high:g}", value)
-            return float(value)
+            try:
+                return finite(value, low, high)
+            except GivenError:
+                raise self.fail(key, f"a number from {low:g} to {high:g}", value) from None
 
         return convert
 
@@ -212,8 +213,8 @@ def read_person(path: Path) -> Person:
     """
     table = toml.read(path)
     like = table.pop("like", None)
-    if like is not None and like not in PEOPLE:
+    if like is not None and not (isinstance(like, str) and like in PEOPLE):
         raise ArgumentError(
-            f"{path}: like: one of {', '.join(PEOPLE)} was expected, found {like!r}"
+            f"{path}: like: one of {', '.join(PEOPLE)} was expected, found {shown(like)}"
         )
     return _person(str(path), table, PEOPLE[like] if like else None)

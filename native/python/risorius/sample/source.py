@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import RisoriusError
+from ..base.reading import open_file
 from ..files import fileio
 from ..files.caches import cache_folder
 
@@ -43,7 +44,7 @@ def downloads() -> Path:
 
 def digest(path: Path) -> str:
     """SHA-256 of a file, in hexadecimal."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

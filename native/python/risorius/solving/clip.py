@@ -22,7 +22,8 @@ import numpy.typing as npt
 from .._native import descend
 from ..anim.clip import Clip
 from ..base.errors import ArgumentError, RisoriusError
-from .surface import Doubles, Floats, Surface, limits, vector
+from ..base.given import MOST, checked, finite, shown, whole
+from .surface import Doubles, Floats, Surface, limits, numbers, vector
 
 Progress = Callable[[float], object]
 _CHUNK = 24  # frames that are solved in a row
@@ -159,7 +160,12 @@ def solve_clip(
     """
     wanted = _meshes("frames", surface, frames, 3)
     count = _frame_count(wanted)
-    _check_numbers(rate=rate, sparse=sparse, smooth=smooth)
+    checked("rate", finite, rate, 0.01, 1e6)
+    checked("start", finite, start, -1e9, 1e9)
+    for name, price in (("sparse", sparse), ("smooth", smooth)):
+        checked(name, finite, price, 0.0, 1e9)
+    checked("most_points", whole, most_points, 1, MOST)
+    checked("threads", whole, threads, 0, 1024)
     moved = _moved(surface, wanted, neutral)
     low, high = limits(surface.control_count, lowest, highest)
     rest = surface.rig.initial_raw_controls.astype(np.float64)
@@ -404,10 +410,12 @@ def _meshes(
     given = values if isinstance(values, Mapping) else {surface.mesh_indices[0]: values}
     out = {}
     for mesh, value in given.items():
-        if mesh not in range(len(surface.vertex_counts)):
+        if not isinstance(mesh, int | np.integer) or not 0 <= mesh < len(surface.vertex_counts):
             end = len(surface.vertex_counts)
-            raise ArgumentError(f"{name}: meshes below {end} were expected, found {mesh}")
-        array = np.asarray(value, np.float32)
+            raise ArgumentError(f"{name}: meshes below {end} were expected, found {shown(mesh)}")
+        is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
+        with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused below
+            array = np.asarray(value if is_real else numbers(name, value), np.float32)
         count = surface.vertex_counts[mesh]
         if array.ndim != axes or array.shape[-2:] != (count, 3):
             shape = f"[F, {count}, 3]" if axes == 3 else f"[{count}, 3]"
@@ -427,13 +435,6 @@ def _frame_count(frames: dict[int, Floats]) -> int:
     if len(counts) > 1 or 0 in counts:
         raise ArgumentError(f"frames: as many of each mesh were expected, found {sorted(counts)}")
     return counts.pop()
-
-
-def _check_numbers(**numbers: float) -> None:
-    for name, value in numbers.items():
-        if not (np.isfinite(value) and (value > 0 or (value == 0 and name != "rate"))):
-            least = "above 0" if name == "rate" else "from 0"
-            raise ArgumentError(f"{name}: a number {least} was expected, found {value}")
 
 
 def _moved(

@@ -18,7 +18,9 @@ import numpy.typing as npt
 
 from .._native import Probe, least_change
 from ..base.errors import ArgumentError
-from .surface import Doubles, Floats, Surface, limits, vector
+from ..base.given import MOST, checked, finite
+from ..base.given import whole as whole_number
+from .surface import Doubles, Floats, Surface, limits, numbers, vector, wholes
 
 METHODS = ("least_squares", "transpose")
 LOCAL = 0.12
@@ -108,14 +110,17 @@ def _drag(
     partners: npt.ArrayLike | None = None,
     ease: npt.ArrayLike | None = None,
 ) -> _Drag:
-    count = len(points)
+    dragged = wholes("points", points)
+    count = len(dragged) if dragged.ndim else 0
     if not count:
         raise ArgumentError("points: one at least was expected, found 0")
-    wanted = np.asarray(targets, np.float64)
-    if wanted.shape != (count, 3) or not np.isfinite(wanted).all():
+    if dragged.shape != (count, 2):
+        raise ArgumentError("points: a mesh and a vertex of each were expected")
+    wanted = numbers("targets", targets)
+    if wanted.shape != (count, 3):
         raise ArgumentError(f"targets: finite numbers of shape [{count}, 3] were expected")
-    along = np.tile(np.eye(3), (count, 1, 1)) if axes is None else np.asarray(axes, np.float64)
-    if along.ndim != 3 or along.shape[::2] != (count, 3) or not np.isfinite(along).all():
+    along = np.tile(np.eye(3), (count, 1, 1)) if axes is None else numbers("axes", axes)
+    if along.ndim != 3 or along.shape[::2] != (count, 3):
         raise ArgumentError(f"axes: finite numbers of shape [{count}, k, 3] were expected")
     weight = vector("weights", 1.0 if weights is None else weights, count)
     if (weight < 0).any():
@@ -124,7 +129,7 @@ def _drag(
     low, high = np.minimum(low, raw), np.maximum(high, raw)
     loose = vector("free", True if free is None else free, len(raw)).astype(bool)
     low[~loose] = high[~loose] = raw[~loose]
-    probe = surface.probe(np.asarray(points, np.int64).reshape(count, 2))
+    probe = surface.probe(dragged)
     easy = vector("ease", 1.0 if ease is None else ease, len(raw))
     unknowns = _unknowns(len(raw), partners, easy)
     # A pair is as ready as its readier half: the other half alone would hold both back.
@@ -167,8 +172,8 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> _Unk
     if not (ease > 0).all():
         raise ArgumentError(f"ease: numbers above 0 were expected, found {ease.min():g}")
     each = np.arange(count)
-    partner = each if partners is None else np.asarray(partners)
-    if partner.shape != (count,) or partner.dtype.kind not in "iu":
+    partner = each if partners is None else wholes("partners", partners)
+    if partner.shape != (count,):
         raise ArgumentError(f"partners: whole numbers of shape [{count}] were expected")
     if ((partner < 0) | (partner >= count)).any() or (partner[partner] != each).any():
         raise ArgumentError("partners: each control's partner was expected to have it as its own")
@@ -230,6 +235,8 @@ def solve_drag(
     at = vector("raw", raw, len(surface.rig.raw_control_names))
     if method not in METHODS:
         raise ArgumentError(f"method: {' or '.join(METHODS)} was expected, found {method!r}")
+    checked("smallest", finite, smallest, 1e-12, 1e12)
+    checked("rounds", whole_number, rounds, 0, 1000)
     given = begin = at
     drag = _drag(
         surface, begin, points, targets, axes, weights, free, lowest, highest, partners, ease
@@ -290,11 +297,11 @@ def _doubles(drag: _Drag, begin: Doubles) -> tuple[list[int], list[int]]:
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
     """int64[N, 2]"""
-    pairs = np.asarray(opposites if len(opposites) else np.empty((0, 2)), np.float64)
-    good = pairs.ndim == 2 and pairs.shape[1:] == (2,) and bool((pairs == pairs.round()).all())
-    if not good or not ((pairs >= 0) & (pairs < count)).all():
+    found = wholes("opposites", opposites)
+    pairs = found if found.size else np.empty((0, 2), np.int64)
+    if pairs.shape[1:] != (2,) or not ((pairs >= 0) & (pairs < count)).all():
         raise ArgumentError(f"opposites: pairs of whole numbers below {count} were expected")
-    return pairs.astype(np.int64)
+    return pairs
 
 
 def _kept_apart(
@@ -396,7 +403,7 @@ def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
         surface: the face.
         reach: float[P, 3, R], what each control does to the points: of surface.jacobian.
     """
-    here = np.linalg.norm(np.asarray(reach, np.float64), axis=1).max(axis=0, initial=0.0)
+    here = np.linalg.norm(numbers("reach", reach), axis=1).max(axis=0, initial=0.0)
     share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
     local = share >= LOCAL * share.max(initial=0.0)
     alone = here / np.maximum(surface.spread(), 1e-30)
@@ -437,8 +444,9 @@ def best_controls(
         ValueError: an argument that makes no sense; the sentence names it.
     """
     at = vector("raw", raw, len(surface.rig.raw_control_names))
-    along = None if axes is None else np.asarray(axes, np.float64)[None]
-    goal = np.asarray(target, np.float64)[None]
+    checked("count", whole_number, count, 0, MOST)
+    along = None if axes is None else numbers("axes", axes)[None]
+    goal = numbers("target", target)[None]
     drag = _drag(surface, at, [point], goal, along, None, free, lowest, highest)
     jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
     square = (jacobian**2).sum(axis=0)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ..base.errors import ArgumentError
+from ..base.given import MOST, checked, whole
 from .surface import Doubles, Floats, Surface
 
 _MOST_CANDIDATES = 3000
@@ -31,8 +31,7 @@ def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[n
     Raises:
         ValueError: a mesh that is not there, a count below 1.
     """
-    if count < 1:
-        raise ArgumentError(f"count: 1 or more was expected, found {count}")
+    checked("count", whole, count, 1, MOST)
     places = surface.positions(surface.rig.initial_raw_controls, mesh).astype(np.float64)
     if not len(places):
         return np.zeros(0, np.int64)

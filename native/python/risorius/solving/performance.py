@@ -17,6 +17,7 @@ from ..base.npz import DAMAGED
 from .surface import Doubles, Floats
 
 _SCALES = 10.0 ** np.arange(-3, 4)
+_FARTHEST = 1e9  # in any unit; squares of what lies farther leave the numbers
 _NEAR = 0.03  # of a face's size: a mesh nearer than this to an even placement is meant to be there
 
 
@@ -62,8 +63,13 @@ def read_performance(
     if kind is not None:
         raise PerformanceError(f"{path}: vertices that move were expected, this is {kind}")
     take = _alembic(path, name, fitting) if suffix == ".abc" else _arrays(path)
-    if not np.isfinite(take.frames).all():
-        raise PerformanceError(f"{path}: finite vertices were expected")
+    for points in (take.frames, take.neutral):
+        if (
+            points is not None
+            and points.size
+            and not -_FARTHEST < points.min() <= points.max() < _FARTHEST
+        ):
+            raise PerformanceError(f"{path}: finite vertices up to {_FARTHEST:g} were expected")
     return take
 
 
@@ -90,11 +96,12 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
                 f"{path}: {name} of numbers was expected, found {values[name].dtype}"
             )
     given = values.get("rate", np.float64(30.0))
-    rate = float(given) if given.size == 1 else np.nan
+    rate = float(given.item()) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
         raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
-    own = None if neutral is None else neutral.astype(np.float32)
-    return Performance(frames.astype(np.float32), rate, 0.0, own)
+    with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused
+        own = None if neutral is None else neutral.astype(np.float32)
+        return Performance(frames.astype(np.float32), rate, 0.0, own)
 
 
 def _alembic(

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from .._native import Dna, Probe, Rig, Skins
 from ..base.errors import ArgumentError
+from ..base.given import LARGEST, MOST, shown
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
@@ -168,15 +169,53 @@ class Surface:
 
     def _points(self, mesh: int, vertices: npt.ArrayLike | None) -> npt.NDArray[np.int64]:
         _below("mesh: an index", mesh, len(self.vertex_counts))
-        rows = np.arange(self.vertex_counts[mesh]) if vertices is None else np.asarray(vertices)
-        if rows.ndim != 1 or (rows.size and rows.dtype.kind not in "iu"):
+        each = np.arange(self.vertex_counts[mesh]) if vertices is None else vertices
+        rows = wholes("vertices", each)
+        if rows.ndim != 1:
             raise ArgumentError("vertices: a list of whole numbers was expected")
-        return np.stack([np.full(len(rows), mesh, np.int64), rows.astype(np.int64)], axis=1)
+        return np.stack([np.full(len(rows), mesh, np.int64), rows], axis=1)
 
 
-def _below(what: str, found: int, end: int) -> None:
-    if not 0 <= found < end:
-        raise ArgumentError(f"{what} below {end} was expected, found {found}")
+def _below(what: str, found: object, end: int) -> None:
+    if not isinstance(found, int | np.integer) or not 0 <= found < end:
+        raise ArgumentError(f"{what} below {end} was expected, found {shown(found)}")
+
+
+def numbers(name: str, values: npt.ArrayLike) -> Doubles:
+    """float64[...] of what a caller gave.
+
+    Args:
+        name: of the argument.
+        values: numbers of any shape.
+
+    Raises:
+        ValueError: no numbers, or some that a float32 does not hold.
+    """
+    try:
+        out = np.asarray(values, np.float64)
+    except (TypeError, ValueError, OverflowError):  # NumPy raises each of them
+        raise ArgumentError(f"{name}: numbers were expected") from None
+    if not (np.abs(out) <= LARGEST).all():
+        raise ArgumentError(f"{name}: finite numbers were expected")
+    return out
+
+
+def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
+    """int64[...] of what a caller gave.
+
+    Args:
+        name: of the argument.
+        values: whole numbers of any shape.
+
+    Raises:
+        ValueError: no whole numbers, or larger ones.
+    """
+    if isinstance(values, np.ndarray) and values.dtype.kind in "iu" and values.dtype != np.uint64:
+        return values.astype(np.int64, copy=False)
+    out = numbers(name, values)
+    if not (np.abs(out) <= MOST).all() or (out != np.round(out)).any():
+        raise ArgumentError(f"{name}: whole numbers were expected")
+    return out.astype(np.int64)
 
 
 def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
@@ -190,11 +229,9 @@ def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
     Raises:
         ValueError: another shape, a value that is no number.
     """
-    out = np.asarray(values, np.float64)
+    out = numbers(name, values)
     if out.shape not in ((), (count,)):
         raise ArgumentError(f"{name}: {count} numbers were expected, found {list(out.shape)}")
-    if not np.isfinite(out).all():
-        raise ArgumentError(f"{name}: finite numbers were expected")
     return np.array(np.broadcast_to(out, (count,)))
 
 

@@ -7,7 +7,6 @@ import os
 import shutil
 import struct
 import subprocess
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from ..base import signatures
 from ..base.errors import RisoriusError
+from ..base.reading import ReadingError, read_file
 
 Samples = npt.NDArray[np.float32]
 
@@ -56,9 +56,9 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
         AudioError: it cannot be opened, is no sound, is damaged, or has no samples.
     """
     try:
-        if os.path.getsize(path) > _MOST_BYTES:
-            raise AudioError(f"{path}: larger than 2 GiB; cut it into parts")
-        data = Path(path).read_bytes()
+        data = read_file(path, _MOST_BYTES)
+    except ReadingError as error:
+        raise AudioError(str(error)) from error
     except OSError as error:
         raise AudioError(f"{path}: cannot read it: {error.strerror}") from error
     kind = signatures.other_kind(data, (signatures.SOUND.code, signatures.FILM.code))
@@ -176,6 +176,8 @@ def _one_channel(channels: Samples) -> Samples:
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
     """A file's sound as the bytes of a WAV file, by ffmpeg."""
+    if not os.path.isfile(path):  # ffmpeg would wait for what was read already
+        raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
     program = shutil.which("ffmpeg")
     if program is None:
         raise AudioError(

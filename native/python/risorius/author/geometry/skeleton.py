@@ -13,6 +13,8 @@ import numpy.typing as npt
 from ... import Dna, Mesh
 from ...rigs.rotation import Convention
 
+FARTHEST = 1e9
+"""From the origin, in a face's unit: 10,000 km. Squares of what lies farther leave the numbers."""
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 

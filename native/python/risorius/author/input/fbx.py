@@ -43,7 +43,7 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a binary FBX", (signatures.FBX.code,))
     if not is_fbx(data):
         raise ShapeFileError(f"{path}: a binary FBX was expected")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...base import signatures
+from ...base.given import GivenError, finite, several
 from ...importing import named_json
 from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
 from ...importing.source import decode, read_bytes
@@ -35,7 +36,7 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
-    data = read_bytes(path)
+    data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a glTF", (signatures.GLB.code,))
     if is_glb(data):
         document = open_glb(path, data)
@@ -209,10 +210,13 @@ def _node_matrix(document: Document, mesh: int) -> Doubles:
 def _local(document: Document, node: Mapping[str, Any], place: str) -> Doubles:
     def numbers(key: str, default: list[float]) -> Doubles:
         value = node.get(key, default)
-        good = isinstance(value, list) and len(value) == len(default)
-        if not good or not all(isinstance(x, int | float) for x in value):
-            raise document.fail(f"{place}.{key}", f"{len(default)} numbers were expected")
-        return np.array(value, np.float64)
+        try:
+            found = several(value, finite)
+        except GivenError:
+            found = ()
+        if len(found) != len(default):
+            raise document.fail(f"{place}.{key}", f"{len(default)} finite numbers were expected")
+        return np.array(found, np.float64)
 
     if "matrix" in node:
         return numbers("matrix", [0.0] * 16).reshape(4, 4).T

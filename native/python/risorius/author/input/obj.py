@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+import io
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import numpy as np
 
 from ...base import signatures
 from ...base.errors import RisoriusError
+from ...base.given import MOST, finite_text, shown, whole_text
+from ...base.reading import MESH, read_file
 from ..geometry.skeleton import Doubles
 
 
@@ -42,8 +45,7 @@ def read_obj(path: Path) -> ObjMesh:
     faces: list[list[int]] = []
     uv_faces: list[list[int]] = []
     refuse_other_kinds(path, "an OBJ")
-    text = path.read_text(encoding="utf-8", errors="replace")
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(_lines(path), 1):
         kind, _, rest = line.strip().partition(" ")
         try:
             if kind == "v":
@@ -97,13 +99,12 @@ def read_positions(path: Path, count: int) -> Doubles:
     """
     refuse_other_kinds(path, "an OBJ")
     positions = []
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        for number, line in enumerate(lines, 1):
-            if line.startswith("v "):
-                try:
-                    positions.append(_numbers(line[2:], 3))
-                except ValueError as error:
-                    raise ShapeFileError(f"{path}: line {number}: {error}") from None
+    for number, line in enumerate(_lines(path), 1):
+        if line.startswith("v "):
+            try:
+                positions.append(_numbers(line[2:], 3))
+            except ValueError as error:
+                raise ShapeFileError(f"{path}: line {number}: {error}") from None
     if len(positions) != count:
         raise ShapeFileError(
             f"{path}: {count:,} vertices were expected, as the neutral mesh has, "
@@ -128,11 +129,20 @@ def refuse_other_kinds(path: Path, expected: str, own: Container[str] = ()) -> N
         raise ShapeFileError(f"{path}: {expected} was expected, this is {kind}")
 
 
+def _lines(path: Path) -> Iterator[str]:
+    """Raises: ReadingError: larger than a mesh may be, or no file; OSError."""
+    data = read_file(path, MESH, found=True)
+    yield from io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
+
+
 def _numbers(text: str, count: int) -> list[float]:
     words = text.split()[:count]
-    values = [float(word) for word in words]
-    if len(values) != count or not np.isfinite(values).all():
-        raise ValueError(f"{count} finite numbers were expected, found {text.strip()!r}")
+    try:
+        values = [finite_text(word) for word in words]
+    except ValueError:
+        values = []
+    if len(values) != count:
+        raise ValueError(f"{count} finite numbers were expected, found {shown(text.strip())}")
     return values
 
 
@@ -144,13 +154,13 @@ def _polygon(text: str, vertices: int, uvs: int) -> tuple[list[int], list[int]]:
         if len(parts) > 1 and parts[1]:
             uv_face.append(_index(parts[1], uvs, "texture coordinate"))
     if len(face) < 3 or len(uv_face) not in (0, len(face)):
-        raise ValueError(f"a polygon of three corners or more was expected, found {text!r}")
+        raise ValueError(f"a polygon of three corners or more was expected, found {shown(text)}")
     return face, uv_face
 
 
 def _index(text: str, count: int, what: str) -> int:
     """From 0; a negative number counts from the end. Raises: ValueError."""
-    number = int(text)
+    number = whole_text(text, -MOST)
     index = number - 1 if number > 0 else count + number
     if not 0 <= index < count:
         raise ValueError(f"{what} {number} of {count} is not there")

@@ -12,7 +12,7 @@ from ... import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
 from ...base.easing import smooth_step
 from ...base.errors import ArgumentError
 from ..geometry.polygon_mesh import polygon_mesh, vertex_normals
-from ..geometry.skeleton import Doubles
+from ..geometry.skeleton import FARTHEST, Doubles
 from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 
@@ -37,6 +37,14 @@ def check_shapes(shapes: ShapeSet) -> list[str]:
         ValueError: no expression moves a vertex, or one is not of the mesh' size.
     """
     size = float(np.ptp(shapes.mesh.positions, axis=0).max())
+    for name, points in (("the neutral mesh", shapes.mesh.positions), *shapes.expressions.items()):
+        if not np.abs(points).max(initial=0.0) <= FARTHEST:
+            raise ArgumentError(
+                f"{name}: coordinates up to {FARTHEST:g} were expected, found "
+                f"{np.abs(points).max():g}"
+            )
+    if not size:
+        raise ArgumentError("the neutral mesh: some size was expected, found vertices in one point")
     out: list[str] = []
     seen: dict[bytes, str] = {}
     moving = 0

@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ... import Dna, load
 from ...base import toml
+from ...base.given import GivenError, finite, flag, several, shown, text, whole
+from ...base.reading import require_regular
 from ..correctives import CorrectiveOptions, add_correctives
 from ..fitting import FitOptions
 from ..geometry.skeleton import Doubles
@@ -21,34 +26,37 @@ from .shape_face import ShapeSet, check_shapes, combined_rows, make_shape_face, 
 
 _READERS = {suffix: gltf.read_gltf for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: fbx.read_fbx}
 _BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
-_TABLES: dict[str, dict[str, tuple[type, ...]]] = {
-    "source": {
-        "dna": (str,),
-        "neutral": (str,),
-        "expressions": (str,),
-        "mesh": (str,),
-        "left": (str,),
-        "unit": (str,),
-    },
+_MOST_JOINTS = 4096
+_MOST_VERTICES = 1 << 26
+
+
+_names = partial(several, of=text)
+_Checks = Mapping[str, Callable[[object], Any]]
+_TABLES: dict[str, _Checks] = {
+    "source": dict.fromkeys(("dna", "neutral", "expressions", "mesh", "left", "unit"), text),
     "joints": {
-        "count": (int,),
-        "influences": (int,),
-        "smoothness": (int, float),
-        "emphasis": (int, float),
-        "rounds": (int,),
-        "symmetric": (bool,),
-        "bound": (bool,),
-        "least_effect_mm": (int, float),
+        "count": partial(whole, low=0, high=_MOST_JOINTS),
+        "influences": partial(whole, low=1, high=16),
+        "smoothness": partial(finite, low=0.0, high=1e6),
+        "emphasis": partial(finite, low=0.0, high=100.0),
+        "rounds": partial(whole, low=0, high=10_000),
+        "symmetric": flag,
+        "bound": flag,
+        "least_effect_mm": partial(finite, low=0.0, high=1e6),
     },
-    "shapes": {"tolerance_mm": (int, float), "keep": (bool,)},
+    "shapes": {"tolerance_mm": partial(finite, low=0.0, high=1e6), "keep": flag},
     "correctives": {
-        "most": (int,),
-        "again": (int,),
-        "solids": (list,),
-        "triples": (int,),
-        "together": (list,),
+        "most": partial(whole, low=0, high=65_535),
+        "again": partial(whole, low=0, high=1_000_000),
+        "solids": _names,
+        "triples": partial(whole, low=0, high=1_000_000),
+        "together": partial(several, of=_names),
     },
-    "lods": {"count": (int,), "joints": (list,), "vertices": (list,)},
+    "lods": {
+        "count": partial(whole, low=1, high=32),
+        "joints": partial(several, of=partial(whole, low=0, high=_MOST_JOINTS)),
+        "vertices": partial(several, of=partial(whole, low=0, high=_MOST_VERTICES)),
+    },
 }
 
 
@@ -85,11 +93,11 @@ def read_spec(path: Path) -> Spec:
         raise ShapeFileError(f"{path}: source.expressions: a folder of OBJ files was expected")
     return Spec(
         path,
-        str(table.get("name", path.stem)),
+        table.get("name", path.stem),
         source,
         _options(path, table),
-        _correctives(path, table.get("correctives", {})),
-        dict(table.get("controls", {})),
+        _correctives(table.get("correctives", {})),
+        table.get("controls", {}),
     )
 
 
@@ -104,42 +112,50 @@ def read_options(path: Path) -> tuple[RigOptions, CorrectiveOptions]:
     for name in ("source", "controls", "name"):
         if name in table:
             raise ShapeFileError(f"{path}: {name}: a person of the sample has its own")
-    return _options(path, table), _correctives(path, table.get("correctives", {}))
+    return _options(path, table), _correctives(table.get("correctives", {}))
 
 
 def _read_tables(path: Path) -> dict[str, Any]:
     try:
-        table = toml.parse(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+        table = toml.parse(toml.text_of(path))
+    except toml.TomlError as error:
         raise ShapeFileError(f"{path}: {error}") from None
-    for name, rows in table.items():
-        if name in ("name", "controls"):
-            continue
-        if name not in _TABLES or not isinstance(rows, dict):
-            known = ", ".join(["name", *_TABLES, "controls"])
-            raise ShapeFileError(f"{path}: {name}: one of {known} was expected")
-        for key, value in rows.items():
-            kinds = _TABLES[name].get(key)
-            if kinds is None:
-                known = ", ".join(_TABLES[name])
-                raise ShapeFileError(f"{path}: {name}.{key}: one of {known} was expected")
-            if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
-                raise ShapeFileError(f"{path}: {name}.{key}: {value!r} is of another kind")
-    return table
+    return {name: _checked(path, name, found) for name, found in table.items()}
+
+
+def _one_or_several(value: object) -> str | list[str]:
+    return list(_names(value)) if isinstance(value, list) else text(value)
+
+
+def _checked(path: Path, name: str, found: object) -> Any:
+    """The value of a key of the file's top. Raises: ShapeFileError: none that is known."""
+    place = name
+    try:
+        if name == "name":
+            return text(found)
+        if name not in (*_TABLES, "controls"):
+            raise GivenError(f"one of {', '.join(['name', *_TABLES, 'controls'])} was expected")
+        if not isinstance(found, dict):
+            raise GivenError(f"a table [{name}] was expected, found {shown(found)}")
+        out = {}
+        for key, value in found.items():
+            place = f"{name}.{key}"
+            check = _one_or_several if name == "controls" else _TABLES[name].get(key)
+            if check is None:
+                raise GivenError(f"one of {', '.join(_TABLES[name])} was expected")
+            out[key] = check(value)
+        return out
+    except GivenError as error:
+        raise ShapeFileError(f"{path}: {place}: {error}") from None
 
 
 def _options(path: Path, table: dict[str, Any]) -> RigOptions:
     named = {"joints" if k == "count" else k: v for k, v in table.get("joints", {}).items()}
-    least = float(named.pop("least_effect_mm", RigOptions.least_effect_mm))
+    least = named.pop("least_effect_mm", RigOptions.least_effect_mm)
     shapes = table.get("shapes", {})
-    tolerance = float(shapes.get("tolerance_mm", 0.05)) if shapes.get("keep", True) else None
+    tolerance = shapes.get("tolerance_mm", 0.05) if shapes.get("keep", True) else None
     levels = dict(table.get("lods", {}))
-    for name in ("joints", "vertices"):
-        budgets = levels.get(name, [])
-        if not all(isinstance(n, int) and not isinstance(n, bool) for n in budgets):
-            raise ShapeFileError(f"{path}: lods.{name}: whole numbers were expected")
-        levels[name] = tuple(budgets)
-    longest = max(len(levels["joints"]), len(levels["vertices"]))
+    longest = max(len(levels.get(name, ())) for name in ("joints", "vertices"))
     if longest and "count" not in levels:
         levels["count"] = longest
     try:
@@ -150,21 +166,8 @@ def _options(path: Path, table: dict[str, Any]) -> RigOptions:
     return RigOptions(FitOptions(**named), tolerance, least, lods)
 
 
-def _correctives(path: Path, table: dict[str, Any]) -> CorrectiveOptions:
-    def names(key: str, rows: object) -> tuple[str, ...]:
-        if not isinstance(rows, list) or not all(isinstance(name, str) for name in rows):
-            raise ShapeFileError(f"{path}: correctives.{key}: names were expected, found {rows!r}")
-        return tuple(rows)
-
-    asked = dict(table)
-    for key in ("most", "again", "triples"):
-        if int(asked.get(key, 0)) < 0:
-            raise ShapeFileError(f"{path}: correctives.{key}: 0 or more was expected")
-    asked.setdefault("most", CorrectiveOptions.most if asked else 0)
-    if "solids" in asked:
-        asked["solids"] = names("solids", asked["solids"])
-    asked["together"] = tuple(names("together", row) for row in asked.get("together", []))
-    return CorrectiveOptions(**asked)
+def _correctives(table: dict[str, Any]) -> CorrectiveOptions:
+    return CorrectiveOptions(**{"most": CorrectiveOptions.most if table else 0, **table})
 
 
 def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
@@ -181,6 +184,7 @@ def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
     """
     folder = spec.path.parent
     if "dna" in spec.source:
+        require_regular(folder / spec.source["dna"])
         return load(folder / spec.source["dna"]), {}, []
     shapes = _read_shapes(spec, folder)
     together = take_combined(shapes)
@@ -211,7 +215,7 @@ def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:
         return out
     files = sorted((folder / spec.source["expressions"]).glob("*.obj"))
     for path in files:
-        if path.resolve() == neutral.resolve():
+        if os.path.realpath(path) == os.path.realpath(neutral):  # a loop of links is none
             continue
         out.expressions[path.stem] = read_positions(path, len(mesh.positions)) - mesh.positions
     if not out.expressions:

@@ -25,7 +25,7 @@ from ...author.joint_rig import JointRig, make_joint_rig
 from ...author.work import RigOptions
 from ...base.words import counted
 from ...files import fileio
-from ..files import CommandLineError, require_suffix
+from ..files import CommandLineError, require_suffix, whole_number
 from ..pages.authoring import need_plot, report_page
 
 _DESCRIPTION = """\
@@ -57,14 +57,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--correctives",
-        type=int,
+        type=whole_number(0, 65_535),
         metavar="N",
         help="find N at most for what goes wrong where expressions meet",
     )
     parser.add_argument(
         "--report", type=Path, metavar="PAGE.html", help="a page with pictures of errors and levels"
     )
-    parser.add_argument("--threads", type=int, default=0, metavar="N", help="0: one for each core")
+    parser.add_argument(
+        "--threads",
+        type=whole_number(0, 1024),
+        default=0,
+        metavar="N",
+        help="0: one for each core",
+    )
     parser.add_argument("--json", action="store_true", help="the errors for a program")
     parser.set_defaults(func=run)
 
@@ -99,11 +105,12 @@ def run(args: argparse.Namespace) -> int:
     if dna is not source and options.tolerance_mm is not None and asked.once_more:
         say.line("looking once more at what joints and shapes do together")
         rig.dna = correct_again(rig.dna, source, asked, say)
+    said = json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out))
     files = {args.out: rig.dna.to_bytes()}
     if args.report is not None:
         files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
     fileio.write_all(files)  # the page last of what can fail: there is no face without it
-    print(json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out)))
+    print(said)
     return 0
 
 
@@ -119,8 +126,6 @@ def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:
     out = replace(spec.correctives, apart=opposites())
     if args.correctives is None:
         return out
-    if args.correctives < 0:
-        raise CommandLineError("author: --correctives: 0 or more was expected")
     return replace(out, most=args.correctives)
 
 

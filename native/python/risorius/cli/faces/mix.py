@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 import risorius
 
+from ...base.given import GivenError, finite_text
 from ...files import fileio
 from ...mixing import REGIONS, Masks, Mix, check_compatible, mix_faces
 from ...mixing.textures import check_room, mix_textures, texture_folder
@@ -41,12 +41,10 @@ def _share(text: str, option: str) -> tuple[str, float]:
     """FILE=SHARE; a name may hold a "=" itself."""
     name, equals, number = text.rpartition("=")
     try:
-        share = float(number) if equals else math.nan
-    except ValueError:
-        share = math.nan
-    if math.isnan(share):
+        share = finite_text(number if equals else "")
+    except GivenError:
         if option:
-            raise CommandLineError(f"--{option}: FILE=SHARE was expected, found {text!r}")
+            raise CommandLineError(f"--{option}: FILE=SHARE was expected, found {text!r}") from None
         return text, 1.0
     return name, share
 

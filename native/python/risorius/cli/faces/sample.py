@@ -15,6 +15,7 @@ from ...author.work import RigOptions
 from ...base.errors import ArgumentError
 from ...sample.build import NEW_JOINTS, NO_SEARCH, RIG
 from ...sample.people import PEOPLE, read_person
+from ..files import whole_number
 from .author import opposites
 
 
@@ -32,7 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     build.add_argument(
         "--joints",
-        type=int,
+        type=whole_number(0, 4096),
         metavar="N",
         help=f"new joints that the expressions are done by (default: {NEW_JOINTS}, or the "
         "spec's); 0: blend shapes alone, without coarser levels of detail",

@@ -12,8 +12,16 @@ import numpy as np
 
 import risorius
 
+from ...author.work import require_sizes
 from ...solving.performance import Performance, fitted, read_performance
-from ..files import CommandLineError, InputError, require_suffix, require_writable
+from ..files import (
+    CommandLineError,
+    InputError,
+    number,
+    require_suffix,
+    require_writable,
+    whole_number,
+)
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -37,15 +45,27 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--object", metavar="NAME", help="the mesh in an Alembic file (default: as many vertices)"
     )
-    parser.add_argument("--rate", type=float, metavar="FPS", help="(default: as the file says, 30)")
+    parser.add_argument(
+        "--rate", type=number(0.01, 1e6), metavar="FPS", help="(default: as the file says, 30)"
+    )
     parser.add_argument(
         "--relative", action="store_true",
         help="take the movement and not the shape: for another face of the same topology, whose "
         "first frame (or neutral of the .npz) is at rest",
     )  # fmt: skip
-    parser.add_argument("--sparse", type=float, default=1.0, metavar="X", help="price of a control")
-    parser.add_argument("--smooth", type=float, default=1.0, metavar="X", help="price of a jerk")
-    parser.add_argument("--lod", type=int, default=0, metavar="N", help="0 is the finest (default)")
+    parser.add_argument(
+        "--sparse", type=number(0.0, 1e9), default=1.0, metavar="X", help="price of a control"
+    )
+    parser.add_argument(
+        "--smooth", type=number(0.0, 1e9), default=1.0, metavar="X", help="price of a jerk"
+    )
+    parser.add_argument(
+        "--lod",
+        type=whole_number(0, 65_535),
+        default=0,
+        metavar="N",
+        help="0 is the finest (default)",
+    )
     parser.add_argument("--report", action="store_true", help="what is left, frame by frame, in mm")
     parser.add_argument("--json", action="store_true", help="report as JSON")
     parser.set_defaults(func=run)
@@ -55,6 +75,10 @@ def run(args: argparse.Namespace) -> int:
     require_suffix(args.out, (".rzc",), "-o")
     require_writable(args.out)
     dna = risorius.load(args.face)
+    try:
+        require_sizes(dna)
+    except risorius.RisoriusError as error:
+        raise InputError(f"{args.face}: {error}") from None
     rig = risorius.Rig(dna)
     if not 0 <= args.lod < max(1, rig.lod_count):
         last = max(1, rig.lod_count) - 1

@@ -9,7 +9,14 @@ from pathlib import Path
 import risorius
 
 from ...files import fileio
-from ..files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
+from ..files import (
+    CommandLineError,
+    InputError,
+    read_bytes,
+    require_suffix,
+    require_writable,
+    whole_number,
+)
 
 _NEEDS = "plot draws with Matplotlib, which is not installed: pip install risorius[plot]"
 
@@ -25,8 +32,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "-o", "--out", type=Path, required=True, metavar="OUT", help="page.html or picture.png"
     )
-    parser.add_argument("--lod", type=int, default=0, metavar="N", help="of the face (default 0)")
-    parser.add_argument("--dpi", type=int, default=150, help="of the images, 40 to 600")
+    parser.add_argument(
+        "--lod",
+        type=whole_number(0, 65_535),
+        default=0,
+        metavar="N",
+        help="of the face (default 0)",
+    )
+    parser.add_argument(
+        "--dpi", type=whole_number(40, 600), default=150, help="of the images, 40 to 600"
+    )
     parser.add_argument("--title", help="in place of the character's name")
     parser.set_defaults(func=run)
 
@@ -35,8 +50,6 @@ def complain(args: argparse.Namespace) -> None:
     """Raises CommandLineError for what is wrong before the file is looked at."""
     require_suffix(args.out, (".html", ".png"), "-o")
     require_writable(args.out)
-    if not 40 <= args.dpi <= 600:
-        raise CommandLineError(f"--dpi: 40 to 600 was expected, found {args.dpi}")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ import risorius
 
 from ...baking.clips import load_performance
 from ...baking.face import load_face
+from ...base.given import GivenError, shown, whole_text
 from ...files import fileio
 from ...web import find_pictures, render
 from ...web.page import SOUNDS, empty_page
@@ -45,9 +46,14 @@ def _lods(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     first, colon, last = text.partition(":")
-    if not all(part.isdigit() for part in (first or "0", last or "0")) or text in ("", ":"):
-        raise CommandLineError(f"--lods: two levels as in 0:2 were expected, found {text!r}")
-    return int(first or 0), int(last or (_LAST_LOD if colon else first))
+    try:
+        if text in ("", ":"):
+            raise GivenError(f"found {shown(text)}")
+        finest = whole_text(first or "0", 0, _LAST_LOD)
+        coarsest = whole_text(last, finest, _LAST_LOD) if last else _LAST_LOD
+    except GivenError as error:
+        raise CommandLineError(f"--lods: two levels as in 0:2 were expected: {error}") from None
+    return finest, coarsest if colon else finest
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: MIT
+"""Numbers and texts that people and files give, checked where they enter.
+
+TOML and JSON have whole numbers of any length, and a text may spell a number in digits that Python
+alone reads. Each goes through here once and is in its range from then on.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from numbers import Integral, Real
+from typing import TypeVar
+
+from .errors import ArgumentError
+
+T = TypeVar("T")
+LARGEST = 3.4028234663852886e38
+"""Of a float32, which DNA files and clips hold."""
+MOST = (1 << 53) - 1
+"""The largest whole number that a float64 and every reader of JSON keep."""
+_WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
+_SHOWN = 40  # letters of a value in an error
+
+
+class GivenError(ArgumentError):
+    """A value of another kind or outside its range; the sentence says what was expected.
+
+    It names no file and no field: who read them puts them before it.
+    """
+
+    code = "given"
+
+
+def whole(value: object, low: int, high: int = MOST) -> int:
+    """A whole number of a file or a caller.
+
+    Args:
+        value: of any type; true and false are no numbers.
+        low: the least that is allowed.
+        high: the most that is allowed.
+
+    Raises:
+        GivenError: it is none, or outside that range.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise GivenError(f"a whole number was expected, found {shown(value)}")
+    number = int(value)
+    if not low <= number <= high:
+        raise GivenError(f"{_range(number, low, high)} was expected, found {shown(number)}")
+    return number
+
+
+def finite(
+    value: object, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
+) -> float:
+    """A finite number of a file or a caller.
+
+    Args:
+        value: of any type; true and false are no numbers.
+        low: the least that is allowed.
+        high: the most that is allowed.
+        above: low itself is not allowed.
+
+    Raises:
+        GivenError: it is none, or outside that range.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise GivenError(f"a number was expected, found {shown(value)}")
+    number = int(value) if isinstance(value, Integral) else float(value)
+    return _inside(number, value, low, high, above=above)
+
+
+def whole_text(typed: str, low: int, high: int = MOST) -> int:
+    """A whole number that somebody typed, in the digits 0 to 9.
+
+    Args:
+        typed: by somebody.
+        low: the least that is allowed.
+        high: the most that is allowed.
+
+    Raises:
+        GivenError: it is none, or outside that range.
+    """
+    if not _WHOLE.fullmatch(typed):
+        raise GivenError(f"a whole number was expected, found {shown(typed)}")
+    return whole(int(typed), low, high)
+
+
+def finite_text(
+    typed: str, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
+) -> float:
+    """A finite number that somebody typed.
+
+    Args:
+        typed: by somebody.
+        low: the least that is allowed.
+        high: the most that is allowed.
+        above: low itself is not allowed.
+
+    Raises:
+        GivenError: it is none, or outside that range.
+    """
+    try:
+        value = float(typed if typed.isascii() and "_" not in typed else "")
+    except ValueError:
+        raise GivenError(f"a number was expected, found {shown(typed)}") from None
+    return _inside(value, typed, low, high, above=above)
+
+
+def text(value: object) -> str:
+    """A text of a file.
+
+    Args:
+        value: of any type.
+
+    Raises:
+        GivenError: it is none, is empty, or has a zero byte, which no name may have.
+    """
+    if not isinstance(value, str) or not value or "\0" in value:
+        raise GivenError(f"text was expected, found {shown(value)}")
+    return value
+
+
+def flag(value: object) -> bool:
+    """True or false of a file.
+
+    Args:
+        value: of any type.
+
+    Raises:
+        GivenError: it is neither.
+    """
+    if not isinstance(value, bool):
+        raise GivenError(f"true or false was expected, found {shown(value)}")
+    return value
+
+
+def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
+    """A list of a file.
+
+    Args:
+        value: of any type.
+        of: checks one of its items and gives it back.
+
+    Raises:
+        GivenError: it is none, or as `of` raises.
+    """
+    if not isinstance(value, list):
+        raise GivenError(f"a list was expected, found {shown(value)}")
+    return tuple(of(item) for item in value)
+
+
+def checked(name: str, check: Callable[..., T], value: object, low: float, high: float) -> T:
+    """An argument of a function, by `whole` or `finite`.
+
+    Args:
+        name: of the argument.
+        check: one of the two.
+        value: of any type.
+        low: the least that is allowed.
+        high: the most that is allowed.
+
+    Raises:
+        ArgumentError: it is none, or outside that range; names the argument.
+    """
+    try:
+        return check(value, low, high)
+    except GivenError as error:
+        raise ArgumentError(f"{name}: {error}") from None
+
+
+def shown(value: object) -> str:
+    """A value as errors show it, cut where it is long.
+
+    Args:
+        value: of any type.
+    """
+    if isinstance(value, list | tuple | dict):
+        return "a table" if isinstance(value, dict) else "a list"
+    if isinstance(value, int) and value.bit_length() > 128:  # Python spells no 4,301 digits
+        return f"a number of {int(value.bit_length() * math.log10(2)) + 1:,} digits"
+    spelled = repr(value)
+    return spelled if len(spelled) <= _SHOWN else f"{spelled[: _SHOWN - 3]}..."
+
+
+def _inside(value: float, found: object, low: float, high: float, *, above: bool) -> float:
+    """A number in its range. Raises: GivenError that shows what was found."""
+    if isinstance(value, float) and not math.isfinite(value):
+        known = low > -LARGEST and high < LARGEST
+        expected = f"{low:g} to {high:g}" if known else "a finite number"
+        raise GivenError(f"{expected} was expected, found {shown(found)}")
+    if not low <= value <= high or (above and value == low):
+        raise GivenError(f"{_range(value, low, high, above)} was expected, found {shown(found)}")
+    return float(value)
+
+
+def _range(value: float, low: float, high: float, above: bool = False) -> str:
+    """What was expected of a number that is outside."""
+    bounded = high < (MOST if isinstance(high, int) else LARGEST)
+    if above and low == 0:
+        return "more than 0" + (f", at most {_plain(high)}" if bounded else "")
+    if bounded and low > -LARGEST:
+        return f"{_plain(low)} to {_plain(high)}"
+    return f"{_plain(low)} or more" if value < low else f"at most {_plain(high)}"
+
+
+def _plain(number: float) -> str:
+    return str(number) if isinstance(number, int) else f"{number:g}"
