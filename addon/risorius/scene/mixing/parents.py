@@ -104,7 +104,7 @@ class _Seen:
         mixing = native.part("mixing")
         places = mixing.Places(self.parents, mixing.Mix(list(shares), regions), self.masks)
         rows = [
-            places.of(self.masks.meshes[number]).places(
+            places.of_mesh(number).places(
                 [parent.meshes[number].positions for parent in self.parents]
             )
             for number in self.meshes
