@@ -15,7 +15,9 @@ from risorius.author import make_joint_rig
 from risorius.base.budget import Budget, BudgetError
 from risorius.base.errors import ArgumentError
 from risorius.cli import main
+from risorius.files.png import png
 from risorius.mixing import Masks, Mix, mix_faces
+from risorius.mixing.textures import mix_textures
 
 MB = 1 << 20
 BASE, BYTES_PER_BYTE = (
@@ -173,3 +175,17 @@ def test_a_performance_that_unfolds_to_gigabytes_is_refused(tmp_path, capsys):
     take.write_bytes(data.replace(stated, struct.pack("<I", 0xF0000000)))
     assert main(["solve", str(face), str(take), "-o", str(tmp_path / "out.rzc")]) == 1
     assert "vertices.npy: 4,026,531,840 bytes more than" in capsys.readouterr().err
+
+
+def test_pictures_that_say_they_are_huge_are_refused(tmp_path):
+    face = large_face()
+    face.metadata = {"texture:head_mesh:color": "skin.png"}
+    data = bytearray(png(np.zeros((4, 4, 3))))
+    data[16:24] = struct.pack(">II", 8000, 8000)
+    paths = []
+    for name in ("a", "b"):
+        (tmp_path / f"{name}_textures").mkdir()
+        (tmp_path / f"{name}_textures" / "skin.png").write_bytes(data)
+        paths.append(tmp_path / f"{name}.dna")
+    with pytest.raises(BudgetError, match="pictures of the faces: 384,000,000 bytes more than"):
+        mix_textures([face, face], paths, Mix([0.5, 0.5]), Masks(face))

@@ -180,7 +180,7 @@ def write(
     shares: Sequence[float],
     regions: Regions,
     progress: Callable[[float], None],
-) -> list[str]:
+) -> dict[str, str]:
     """Writes the mix as a DNA file, with its textures beside it.
 
     Args:
@@ -191,7 +191,7 @@ def write(
         progress: told the share that is done, 0 to 1.
 
     Returns:
-        Names of textures that are the leading parent's own, as another program wrote them.
+        Names of textures that are the leading parent's own -> why: a key of mixing.textures.WHY.
 
     Raises:
         MixError: the file is one of the parents.
@@ -215,4 +215,4 @@ def write(
     folder = textures.texture_folder(target)
     files = {target: dna.to_bytes()} | {folder / name: data for name, data in pictures.items()}
     fileio.write_all(files)
-    return list(own)
+    return dict(own)

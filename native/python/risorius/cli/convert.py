@@ -106,7 +106,7 @@ def complain(args: argparse.Namespace) -> None:
     if args.indent is not None and not 0 <= args.indent <= 8:
         raise CommandLineError(f"--indent: 0 to 8 was expected, found {args.indent}")
     if not args.force:
-        refuse_same_file(args.input, args.output)
+        refuse_same_file(args.input, args.output, "--force replaces it")
     require_writable(args.output)
 
 

@@ -120,7 +120,7 @@ def complain(args: argparse.Namespace) -> None:
     if not 0 <= args.foreign_share <= 1:
         raise CommandLineError(f"--foreign-share: 0 to 1 was expected, found {args.foreign_share}")
     if not args.force:
-        refuse_same_file(args.input, args.output)
+        refuse_same_file(args.input, args.output, "--force replaces it")
     require_writable(args.output, args.plot)
 
 

@@ -43,7 +43,7 @@ _OTHER_KINDS = (
     (b"\x1f\x8b", 0, "an archive (gzip): unpack it first"),
     (b"BLENDER", 0, "a scene of Blender (.blend): open it there"),
     (b"\x28\xb5\x2f\xfd", 0, "packed by Zstandard, as Blender packs its scenes (.blend)"),
-    (b"DNA\0", 0, "a face (DNA): Import DNA in Blender takes it, or give it as --rig"),
+    (b"DNA\0", 0, "a face (DNA): Import DNA in Blender and `risorius info` take it"),
     (b"RZC\x1a", 0, "a clip of Risorius whose name does not end in .rzc: rename it"),
 )
 
