@@ -166,6 +166,16 @@ def test_faces_without_some_layers_mix_with_their_like_alone(layers, tmp_path, c
         assert "is of the region mouth" in capsys.readouterr().err
 
 
+def test_a_region_of_teeth_alone_has_a_size():
+    """Nothing of the skin moves, so all of it is skull."""
+    face = risorius.load(GOLDEN / "ml.dna", layers="geometry")
+    mixed = mix_faces([face, moved(face)], Mix([0.5, 0.5], {"mouth": {1: 1}}))
+    for mesh, own in zip(mixed.meshes, face.meshes, strict=True):
+        apart = np.asarray(mesh.positions) - own.positions
+        assert (apart[:, 1] >= 0.4).all()
+        assert (apart[:, 1] <= 1.1).all()
+
+
 def test_a_neutral_pose_that_is_no_number_is_said():
     face = risorius.load(GOLDEN / "core.dna")
     other = copy.copy(face)

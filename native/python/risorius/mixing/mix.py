@@ -125,7 +125,8 @@ class Places:
         skin = masks.skin
         positions = [np.asarray(p.meshes[skin].positions, np.float64) for p in parents]
         part = masks.meshes[skin]
-        face = 1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]
+        # Of shares whose sum is 1 but for rounding.
+        face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
         # Where two regions meet is what has to fit: rims lie upon each other.

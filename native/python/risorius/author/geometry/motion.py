@@ -14,9 +14,9 @@ from ...base.budget import Budget
 from .skeleton import STILL, Doubles, Ints, joint_levels, skin_entries, world_matrices
 
 _HELD = 1 << 14  # matrices at once
-_OF_A_JOINT = 16  # steps
-_OF_A_LEVEL = 64
-_OF_A_WEIGHT = 4
+_OF_A_JOINT = 256  # steps, some nanoseconds each
+_OF_A_LEVEL = 4096
+_OF_A_WEIGHT = 32
 
 
 class Motion(NamedTuple):
