@@ -109,8 +109,9 @@ def test_mixing_holds_no_more_than_some_times_the_faces(sizes, change):
     face = large_face(**sizes)
     other = copy.copy(face)
     change(other)
-    mix = Mix([0.5, 0.5], {"jaw": {1: 1}})
-    mixed, peak = peak_of(lambda: mix_faces([face, other], mix))
+    by_region = change is not _groups_that_share_a_joint
+    mix = Mix([0.5, 0.5], {"jaw": {1: 1}} if by_region else {})
+    mixed, peak = peak_of(lambda: mix_faces([other, face], mix))
     assert peak < BASE + BYTES_PER_BYTE * (face.size_in_bytes() + other.size_in_bytes())
     values = sum(g.values.size for dna in (face, other) for g in dna.joint_groups)
     assert sum(g.values.size for g in mixed.joint_groups) <= 4 * values

@@ -24,7 +24,7 @@ MM = {"cm": 10.0, "m": 1000.0}
 CARRIED_MM = 20.0
 # What a face may take while it is made: a table of a whole face's expressions is some hundred times
 # the deltas that its file holds.
-_BASE_BYTES, _BYTES_PER_BYTE = 1 << 30, 128
+_BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
