@@ -10,6 +10,7 @@
 #include "dna/file/json.h"
 #include "dna/file/parse.h"
 #include "dna/file/write.h"
+#include "dna/size.h"
 #include "dna/validate.h"
 
 namespace risorius::bindings {
@@ -248,6 +249,9 @@ void bind_changes(DnaClass& c) {
         return describe(warnings);
       },
       "The oddities that can be lived with. Raises DnaError for what cannot.");
+  c.def(
+      "size_in_bytes", [](const Dna& s) { return dna::size_in_bytes(s); },
+      "Bytes of its numbers and texts, as a file has them: what work on it is held against.");
   c.def(
       "filter_lods",
       [](const Dna& s, const py::object& lods) {

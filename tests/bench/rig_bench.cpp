@@ -423,6 +423,15 @@ core::Result<dna::Dna> read(const char* path) {
   return dna::parse(**source);
 }
 
+// What a face lacks for a table of evaluations, or nullptr.
+const char* missing_part(const dna::Dna& dna) {
+  if (dna.definition.raw_control_names.empty()) return "raw controls";
+  if (dna.descriptor.lod_count == 0) return "LODs";
+  if (dna.definition.joint_names.empty()) return "joints";
+  const auto has_values = [](const dna::JointGroup& group) { return !group.values.empty(); };
+  return std::ranges::any_of(dna.behavior.joint_groups, has_values) ? nullptr : "joint groups";
+}
+
 // One set of frames, read from a file or made. Out: false, having said so, where the file is none.
 bool add_frames(const std::string& name, std::size_t raw, std::size_t active, const char* file,
                 std::vector<Frames>& out) {
@@ -471,8 +480,9 @@ int main(int argc, char** argv) {
     return 1;
   }
   const std::size_t raw = dna->definition.raw_control_names.size();
-  if (raw == 0 || dna->descriptor.lod_count == 0) {
-    std::fprintf(stderr, "rig_bench: %s: a face with controls and LODs was expected\n", argv[1]);
+  if (const char* missing = missing_part(*dna)) {
+    std::fprintf(stderr, "rig_bench: %s: a face with %s was expected, found none\n", argv[1],
+                 missing);
     return 1;
   }
   const bool files = argc >= 5 && argv[2][0] != '-';

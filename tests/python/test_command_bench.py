@@ -89,6 +89,23 @@ def test_bad_files_are_sentences(tmp_path: Path, capfd: pytest.CaptureFixture[st
     assert "bad.dna" in capfd.readouterr().err
 
 
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("layers", "part"),
+    [("descriptor", "raw controls"), ("definition", "joint groups"), ("geometry", "joint groups")],
+)
+def test_a_face_that_does_nothing_is_a_sentence(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], layers: str, part: str
+) -> None:
+    risorius.load(MEDIUM, layers=layers).save(tmp_path / "face.dna")
+    assert cli.main(["bench", str(tmp_path / "face.dna"), "--quick"]) == 1
+    out, error = capfd.readouterr()
+    assert out == ""
+    assert error == (
+        f"rig_bench: {tmp_path / 'face.dna'}: a face with {part} was expected, found none\n"
+    )
+
+
 def test_without_the_program_it_says_so(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -114,7 +114,7 @@ def test_mappings_are_listed_copied_and_checked(tmp_path, capsys, monkeypatch):
     [
         (["convert", "none.csv", "-o", "a.csv"], 1, "none.csv: cannot read it"),
         (["convert", "take.csv", "-o", "a.txt"], 2, "a name ending in .rzc, .csv, .json"),
-        (["convert", "take.csv", "-o", "take.csv"], 2, "OUTPUT is INPUT itself"),
+        (["convert", "take.csv", "-o", "take.csv"], 2, "itself: choose another name"),
         (
             ["convert", "take.csv", "-o", "a.csv", "--neutral", "x"],
             2,

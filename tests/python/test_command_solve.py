@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 import risorius
 from command_line import run
+from conftest import GOLDEN
+from risorius.cli import main
 from risorius.solving.performance import PerformanceError, fitted, read_performance
 from skin_oracle import skinned, small_face
 
@@ -179,3 +181,15 @@ def test_a_face_that_cannot_be_computed_with_is_one_sentence(tmp_path, change, s
     done = run(*words, text=True)
     assert done.returncode == 1
     assert re.search(f"face.dna: .*{said}", done.stderr)
+
+
+@pytest.mark.parametrize("layers", ["descriptor", "definition", "behavior"])
+def test_a_face_without_meshes_is_one_sentence(tmp_path, capsys, layers):
+    face = tmp_path / "face.dna"
+    risorius.load(GOLDEN / "core.dna", layers=layers).save(face)
+    np.savez(tmp_path / "take.npz", vertices=np.zeros((2, 5, 3)))
+    command = ["solve", str(face), str(tmp_path / "take.npz"), "-o", str(tmp_path / "out.rzc")]
+    for more in ([], ["--mesh", "head_lod0_mesh"]):
+        assert main([*command, *more]) == 1
+        expected = f"risorius: {face}: a face with meshes was expected\n"
+        assert capsys.readouterr().err == expected

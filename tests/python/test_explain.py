@@ -291,6 +291,16 @@ def test_quaternions_and_controls_that_are_not_finite_are_refused():
         explain(dna, risorius.Rig(dna), [0, np.nan, 0, 0])
 
 
+@pytest.mark.parametrize("name", ["core", "mlquat", "quatjoints"])
+def test_a_pose_that_is_not_finite_is_one_sentence(name, capsys):
+    path = GOLDEN / f"{name}.dna"
+    controls = [f"{control}=3e38" for control in risorius.load(path).raw_control_names]
+    assert main(["eval", str(path), *controls, "--explain"]) == 1
+    error = capsys.readouterr().err
+    assert "explain: a pose of finite numbers was expected, found " in error
+    assert error.count("\n") == 1
+
+
 # ---- names
 
 NAMES = [

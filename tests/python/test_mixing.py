@@ -307,14 +307,31 @@ def test_the_command_writes_a_face_with_its_textures(files, faces, capsys):
     assert "mixes with" in capsys.readouterr().out
 
 
-def test_a_picture_of_another_program_is_taken_as_it_is(files, capsys):
-    picture = files / "one_textures" / "skin.png"
-    picture.write_bytes(b"a picture of another program")
+@pytest.mark.parametrize(
+    ("ours", "theirs", "why"),
+    [
+        (b"a picture of another program", None, "Risorius mixes its own kind of PNG alone"),
+        (png(np.full((4, 8, 4), 0.5)), None, "they have opacity, as hair has"),
+        (None, png(np.full((8, 8, 3), 0.5)), "the faces have them in different sizes"),
+        (None, png(np.full((4, 8, 3), 0.5))[:-40], "Risorius mixes its own kind of PNG alone"),
+        (None, b"", "not every face has them"),
+    ],
+    ids=["another program's", "opacity", "size", "damaged", "missing"],
+)
+def test_a_picture_that_is_not_mixed_is_taken_as_it_is_and_why_is_said(
+    files, capsys, ours, theirs, why
+):
+    pictures = [files / f"{name}_textures" / "skin.png" for name in ("one", "narrow")]
+    for picture, data in zip(pictures, (ours, theirs), strict=True):
+        if data is not None:
+            picture.write_bytes(data)
+    if theirs == b"":
+        pictures[1].unlink()
     out = files / "child.dna"
     command = ["mix", str(files / "one.dna"), f"{files / 'narrow.dna'}=0.5", "-o", str(out)]
     assert main(command) == 0
-    assert "skin.png" in capsys.readouterr().out
-    assert (files / "child_textures" / "skin.png").read_bytes() == picture.read_bytes()
+    assert f"  pictures of one, as {why}: skin.png\n" in capsys.readouterr().out
+    assert (files / "child_textures" / "skin.png").read_bytes() == pictures[0].read_bytes()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no files of these names")
@@ -352,6 +369,7 @@ def test_names_of_pictures_lead_nowhere_and_two_of_one_file_are_one(files, capsy
         (["one.dna", "--mouth", "narrow.dna"], 2, "--mouth: FILE=SHARE was expected"),
         (["one.dna=0"], 1, "one of them above 0"),
         (["one.dna", "--neck", "narrow.dna=1"], 1, "no vertex of one is of the region neck"),
+        (["child.dna", "one.dna"], 2, "child.dna: the output is the input itself: choose another"),
         (["one.dna", "other.dna"], 1, "other.dna cannot be mixed with one.dna: it has no joint"),
     ],
 )
@@ -362,11 +380,14 @@ def test_bad_input_is_one_sentence_and_no_file(
     other = copy.deepcopy(faces[1])
     _rename("joint_names", -1, "other")(other)
     other.save("other.dna")
+    is_there = "child.dna" in arguments
+    if is_there:
+        faces[0].save("child.dna")
     assert main(["mix", *arguments, "-o", "child.dna"]) == code
     error = capsys.readouterr().err
     assert sentence in error
     assert error.count("\n") == 1
-    assert not Path("child.dna").exists()
+    assert Path("child.dna").exists() == is_there
     assert not Path("child_textures").exists()
 
 

@@ -776,6 +776,8 @@ class Dna:
     def warnings(self) -> list[str]: ...
     def validate(self) -> list[str]:
         """The oddities that can be lived with. Raises DnaError for what cannot."""
+    def size_in_bytes(self) -> int:
+        """Bytes of its numbers and texts, as a file has them: what work on it is held against."""
     def filter_lods(self, lods: tuple[int, int] | Sequence[int] | None) -> Dna:
         """A copy with (max_lod, min_lod) or [lod, ...] only; every index counts in what is left."""
     def convert(

@@ -104,7 +104,7 @@ class _Seen:
         mixing = native.part("mixing")
         places = mixing.Places(self.parents, mixing.Mix(list(shares), regions), self.masks)
         rows = [
-            places.of(self.masks.meshes[number]).places(
+            places.of_mesh(number).places(
                 [parent.meshes[number].positions for parent in self.parents]
             )
             for number in self.meshes
@@ -180,7 +180,7 @@ def write(
     shares: Sequence[float],
     regions: Regions,
     progress: Callable[[float], None],
-) -> list[str]:
+) -> dict[str, str]:
     """Writes the mix as a DNA file, with its textures beside it.
 
     Args:
@@ -191,7 +191,7 @@ def write(
         progress: told the share that is done, 0 to 1.
 
     Returns:
-        Names of textures that are the leading parent's own, as another program wrote them.
+        Names of textures that are the leading parent's own -> why: a key of mixing.textures.WHY.
 
     Raises:
         MixError: the file is one of the parents.
@@ -217,4 +217,4 @@ def write(
     folder = textures.texture_folder(target)
     files = {target: dna.to_bytes()} | {folder / name: data for name, data in pictures.items()}
     fileio.write_all(files)
-    return list(own)
+    return dict(own)

@@ -17,6 +17,13 @@ from ..file.import_operators import import_character
 from ..words import of_error, say
 from .properties import choices, follow, paths_of, shares_of
 
+# Why pictures are one face's own; those of hair are so by intent.
+_NOT_MIXED = {
+    "missing": "Not mixed, as not every face has them: {names}",
+    "format": "Not mixed, as Risorius mixes its own kind of PNG alone: {names}",
+    "size": "Not mixed, as the faces have them in different sizes: {names}",
+}
+
 
 def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
     """Adds faces to those that are mixed; those that do not go together are said and left out."""
@@ -165,11 +172,9 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
             name = getattr(error, "filename", None) or self.filepath
             self.report({"ERROR"}, explain(name, error))
             return {"CANCELLED"}
-        if own:
-            self.report(
-                {"WARNING"},
-                say("Not mixed, as another program wrote them: {names}", names=", ".join(own)),
-            )
+        for why, text in _NOT_MIXED.items():
+            if names := ", ".join(name for name, found in own.items() if found == why):
+                self.report({"WARNING"}, say(text, names=names))
         if not self.use_import:
             return {"FINISHED"}
         parents.hide(context)

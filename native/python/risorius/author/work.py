@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from .. import Dna, JointGroup, Mesh
+from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from .fitting import FitOptions, JointFit
 from .geometry import skeleton as sk
@@ -21,6 +22,9 @@ MM = {"cm": 10.0, "m": 1000.0}
 # A vertex that follows another joint of the neck than before counts as one that is so far off: a
 # head that is turned moves them about so far against each other.
 CARRIED_MM = 20.0
+# What a face may take while it is made: a table of a whole face's expressions is some hundred times
+# the deltas that its file holds.
+_BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
@@ -108,6 +112,8 @@ def begin(dna: Dna) -> Work:
         raise ArgumentError("a face with meshes and at least one joint was expected")
     require_sizes(dna)
     count = sk.column_count(dna)
+    together = sk.psd_parts(dna)
+    _check_size(dna, count, together)
     deltas = sk.column_deltas(dna, count)
     if np.any(deltas[..., 6:9]):
         joint = int(np.argwhere(deltas[..., 6:9].any(axis=(0, 2)))[0, 0])
@@ -115,8 +121,9 @@ def begin(dna: Dna) -> Work:
     motions = sk.column_motions(dna, count)
     moving = np.flatnonzero(deltas.any(axis=(1, 2)))
     shaped = {c for mesh in dna.meshes for c in sk.column_shapes(dna, mesh, count)}
-    together = sk.psd_parts(dna)
     columns = sorted((shaped | {int(c) for c in moving}) - set(together))
+    if not columns:
+        raise ArgumentError("a face with controls that move it was expected, found none that does")
     names = [_column_name(dna, column) for column in columns]
     rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))
     work = Work(dna, copy.copy(dna), columns, names, motions[columns], rest[:, :3, 3], 0)
@@ -151,6 +158,25 @@ def require_sizes(dna: Dna) -> None:
             spread = max(spread, float(np.ptp(points, axis=0).max()))
     if not spread:
         raise ArgumentError("a mesh of some size was expected, found vertices in one point")
+
+
+def _check_size(dna: Dna, count: int, together: Container[int]) -> None:
+    """Raises: BudgetError: tables of what inputs do to joints and vertices would be far larger than
+    the face.
+
+    Args:
+        dna: the face.
+        count: of its inputs.
+        together: inputs that are correctives.
+    """
+    budget = Budget(_BASE_BYTES + _BYTES_PER_BYTE * dna.size_in_bytes(), 0)
+    joints, vertices = len(dna.joint_names), [len(mesh.positions) for mesh in dna.meshes]
+    numbers = 9 + 3 * 16  # attributes, and the matrices of a joint on its way to the world
+    budget.hold(8 * numbers * count * joints, f"{joints:,} joints that {count:,} inputs move")
+    budget.hold(8 * joints * max(vertices), f"weights of {joints:,} joints")
+    alone = sum(column not in together for column in range(count))
+    place = f"{sum(vertices):,} vertices that {alone:,} inputs move"
+    budget.hold(8 * 3 * sum(vertices) * alone, place)
 
 
 def _column_name(dna: Dna, column: int) -> str:

@@ -11,12 +11,13 @@ import sys
 import sysconfig
 import tempfile
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 import risorius
 from risorius.base.errors import RisoriusError
-from risorius.base.npz import DAMAGED
+from risorius.base.npz import DAMAGED, hold_arrays
 
 from .files import InputError
 
@@ -83,8 +84,14 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
 
 
 def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
+    with open(source, "rb") as opened:
+        hold_arrays(opened)
+        return _write_frames(source, opened, raw_count, folder)
+
+
+def _write_frames(source: Path, opened: BinaryIO, raw_count: int, folder: Path) -> list[str]:
     paths = []
-    with open(source, "rb") as opened, np.load(opened) as arrays:
+    with np.load(opened) as arrays:
         for name in FRAMES:
             if name not in arrays:
                 raise InputError(f"{source}: an array {name!r} was expected")

@@ -107,7 +107,7 @@ def complain(args: argparse.Namespace) -> None:
     if args.indent is not None and args.output_kind != "json":
         raise CommandLineError("--indent: only JSON is indented")
     if not args.force:
-        refuse_same_file(args.input, args.output)
+        refuse_same_file(args.input, args.output, "--force replaces it")
     require_writable(args.output)
 
 

@@ -121,7 +121,7 @@ def complain(args: argparse.Namespace) -> None:
             f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"
         )
     if not args.force:
-        refuse_same_file(args.input, args.output)
+        refuse_same_file(args.input, args.output, "--force replaces it")
     require_writable(args.output, args.plot)
 
 

@@ -104,12 +104,13 @@ def kind_of(name: str, asked: str | None, option: str) -> str:
     raise CommandLineError(f"{name}: a name ending in .dna or .json was expected, or {option}")
 
 
-def refuse_same_file(source: str, target: str) -> None:
+def refuse_same_file(source: str, target: str, advice: str = "choose another name") -> None:
     """Refuse an output that is the input, by whatever path; "-" is no file.
 
     Args:
         source: name of the input.
         target: name of the output.
+        advice: what mends it; an option only where the command has it.
 
     Raises:
         CommandLineError: they are one file.
@@ -121,7 +122,7 @@ def refuse_same_file(source: str, target: str) -> None:
     except OSError:  # one of them is not there
         return
     if same:
-        raise CommandLineError(f"{target}: OUTPUT is INPUT itself; --force replaces it")
+        raise CommandLineError(f"{target}: the output is the input itself: {advice}")
 
 
 def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:

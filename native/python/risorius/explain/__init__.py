@@ -15,7 +15,13 @@ import numpy.typing as npt
 import risorius
 from risorius.base.errors import ArgumentError
 
-from ..controls.control_names import ControlNames, Meaning, UnknownControlError, find_controls
+from ..controls.control_names import (
+    ControlNames,
+    Meaning,
+    UnknownControlError,
+    find_controls,
+    named,
+)
 from .behavior import (
     explain_correctives,
     explain_maps,
@@ -53,7 +59,7 @@ def explain(
         joints add up to the joint's pose.
 
     Raises:
-        ValueError: a rig with quaternions, controls that are not finite.
+        ValueError: a rig with quaternions, controls or a pose that are not finite.
     """
     if rig.rotation != "euler":
         raise ArgumentError("explain: a rig with rotation='euler' was expected")
@@ -61,6 +67,7 @@ def explain(
     if not np.isfinite(values).all():
         raise ArgumentError("explain: raw controls that are finite were expected")
     pose = rig.evaluate(values, lod=lod)
+    _check_finite(dna, pose)
     names = ControlNames(dna)
     controls = np.asarray(pose.controls, float)
     rest = np.asarray(rig.initial_raw_controls, float)
@@ -90,3 +97,21 @@ def explain(
         ),
         "ignored_layers": rig.ignored_layers,
     }
+
+
+def _check_finite(dna: risorius.Dna, pose: risorius.Pose) -> None:
+    """Raises: ArgumentError: what is no number has no parts that add up to it."""
+    of = {
+        "joint": (pose.joints, dna.joint_names),
+        "blend shape channel": (pose.blend_shapes, dna.blend_shape_channel_names),
+        "animated map": (pose.animated_maps, dna.animated_map_names),
+        "control": (pose.controls, dna.raw_control_names),
+    }
+    for kind, (found, names) in of.items():
+        odd = np.argwhere(~np.isfinite(found))
+        if len(odd):
+            value = np.asarray(found)[tuple(odd[0])]
+            name = named(names, int(odd[0, 0]), kind)
+            raise ArgumentError(
+                f"explain: a pose of finite numbers was expected, found {value} at {kind} {name}"
+            )

@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
+Pixels = npt.NDArray[np.uint8]
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _MOST_TEXELS = 1 << 26
+_BAND = 1 << 22  # values that are predicted at once
 
 
 def png(image: Floats) -> bytes:
@@ -19,19 +21,30 @@ def png(image: Floats) -> bytes:
 
     The fourth value is the opacity, which the colour is not multiplied with.
     """
-    pixels = np.clip(np.rint(image[::-1] * 255), 0, 255).astype(np.uint8)
-    height, width = pixels.shape[:2]
-    values = 1 if pixels.ndim == 2 else pixels.shape[2]
+    return pixels_to_png(np.clip(np.rint(image * 255), 0, 255).astype(np.uint8))
+
+
+def pixels_to_png(image: Pixels) -> bytes:
+    """As png, of uint8 from 0 to 255."""
+    height, width = image.shape[:2]
+    values = 1 if image.ndim == 2 else image.shape[2]
     kind = {1: 0, 3: 2, 4: 6}[values]
-    rows = _predicted(pixels.reshape(height, -1), values)
+    rows = image[::-1].reshape(height, -1)
 
     def chunk(name: bytes, data: bytes) -> bytes:
         crc = zlib.crc32(name + data)
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", crc)
 
+    packer, body = zlib.compressobj(6), []
+    band = max(1, _BAND // max(1, width * values))
+    for begin in range(0, height, band):
+        first = max(0, begin - 1)  # the row above is what a row may be predicted from
+        predicted = _predicted(rows[first : begin + band], values)[begin - first :]
+        body.append(packer.compress(predicted.tobytes()))
+    body.append(packer.flush())
     header = struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)
-    body = zlib.compress(rows.tobytes(), 6)
-    return _SIGNATURE + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+    whole = chunk(b"IHDR", header) + chunk(b"IDAT", b"".join(body)) + chunk(b"IEND", b"")
+    return _SIGNATURE + whole
 
 
 def _predicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8]:
@@ -52,6 +65,15 @@ def _predicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8
     return np.concatenate([best[:, None].astype(np.uint8), chosen], axis=1)
 
 
+def has_opacity(data: bytes) -> bool:
+    """Whether a file is a PNG of 8 bits whose pixels have an opacity, as those of hair have.
+
+    Args:
+        data: of the file.
+    """
+    return _header(data)[2:] in ((8, 6), (8, 4))
+
+
 def read_png(data: bytes) -> Floats | None:
     """An image without opacity that png wrote, or None: another kind of file, or damaged.
 
@@ -61,19 +83,49 @@ def read_png(data: bytes) -> Floats | None:
     Returns:
         float64[h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom.
     """
-    if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
+    pixels = read_pixels(data)
+    return None if pixels is None else np.asarray(pixels / 255.0)
+
+
+def read_pixels(data: bytes) -> Pixels | None:
+    """As read_png, uint8 from 0 to 255.
+
+    Args:
+        data: of the file.
+    """
+    shape = pixels_of(data)
+    if shape is None:
         return None
-    width, height, depth, kind, *others = struct.unpack(">IIBBBBB", data[16:29])
-    values = {0: 1, 2: 3}.get(kind, 0)
-    if depth != 8 or any(others) or not 0 < width * height * values <= 3 * _MOST_TEXELS:
-        return None
+    height, width, values = shape
     body = _body(data, height * (1 + width * values))
     rows = np.frombuffer(body, np.uint8).reshape(height, -1) if body else None
     if rows is None or rows[:, 0].max(initial=0) > 2:  # another program's, which predicts more
         return None
     pixels = _unpredicted(rows, values)
     pixels = pixels.reshape((height, width, values) if values > 1 else (height, width))
-    return np.asarray(pixels[::-1] / 255.0)
+    return pixels[::-1]
+
+
+def pixels_of(data: bytes) -> tuple[int, int, int] | None:
+    """Height, width and values of a pixel that a file says it holds; None: read_png does not
+    read such a file.
+
+    Args:
+        data: of the file.
+    """
+    width, height, depth, kind = _header(data)
+    values = {0: 1, 2: 3}.get(kind, 0)
+    if depth != 8 or any(data[26:29]) or not 0 < width * height * values <= 3 * _MOST_TEXELS:
+        return None
+    return height, width, values
+
+
+def _header(data: bytes) -> tuple[int, int, int, int]:
+    """Width, height, bits of a value and kind of a PNG; zeros for what is none."""
+    if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
+        return 0, 0, 0, 0
+    width, height, depth, kind = struct.unpack(">IIBB", data[16:26])
+    return width, height, depth, kind
 
 
 def _unpredicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8]:
@@ -87,16 +139,16 @@ def _unpredicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uin
     return out
 
 
-def _body(data: bytes, size: int) -> bytes:
+def _body(data: bytes, size: int) -> bytearray:
     """The rows, unpacked; none where they are not of this size."""
-    unpacked, out = zlib.decompressobj(), b""
+    unpacked, out = zlib.decompressobj(), bytearray()
     try:
         for kind, part in _chunks(data):
             if kind == b"IDAT":
                 out += unpacked.decompress(part, size + 1 - len(out))
     except zlib.error:
-        return b""
-    return out if len(out) == size else b""
+        return bytearray()
+    return out if len(out) == size else bytearray()
 
 
 def _chunks(data: bytes) -> list[tuple[bytes, bytes]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import Dna, Mesh
 from ..base.errors import ArgumentError
+from ..base.words import counted, plural
 from .hair import without_hair
 
 _NAMES = {
@@ -41,11 +42,17 @@ _TOPOLOGY = (
     "layout_texture_coordinates",
     "layout_normals",
 )
-_OTHERS = {  # layers that are taken as they are, and so must be alike
+_VALUES = ("texture_coordinates", "normals")
+_OTHERS = {  # what is taken as it is, and so must be alike
+    "blend_shape_channels": "drivers of blend shapes",
     "rbf_behavior": "RBF solvers",
+    "rbf_behavior_ext": "poses of RBF solvers",
     "twist_swing_behavior": "twists and swings",
     "machine_learned_behavior": "neural networks",
+    "machine_learned_behavior_ext": "operations and joints of neural networks",
+    "joint_behavior_metadata": "kinds of joint rotations",
 }
+_QUATERNION = 1  # of a joint's rotation in joint_representations
 
 
 def difference(one: Dna, other: Dna) -> str | None:
@@ -81,15 +88,21 @@ def _names(one: Dna, other: Dna) -> str | None:
         a, b = list(getattr(one, field)), list(getattr(other, field))
         if a == b:
             continue
-        lacking = [n for n in a if n not in set(b)]
-        more = [n for n in b if n not in set(a)]
+        ours, theirs = set(a), set(b)
+        lacking = [n for n in a if n not in theirs]
+        more = [n for n in b if n not in ours]
         if lacking:
             return f"it has no {word} {lacking[0]}"
         if more:
             return f"it has a {word} {more[0]} that the other lacks"
-        return f"its {word}s are in another order"
+        return f"its {plural(word)} are in another order"
     if [int(p) for p in one.joint_parents] != [int(p) for p in other.joint_parents]:
         return "a joint hangs on another one"
+    for dna, word in ((one, "the first face"), (other, "it")):
+        for field in ("neutral_joint_translations", "neutral_joint_rotations"):
+            odd = np.argwhere(~np.isfinite(getattr(dna, field)))
+            if len(odd):
+                return f"{word} has no finite number as {field} of {dna.joint_names[odd[0, 0]]}"
     return None
 
 
@@ -122,26 +135,70 @@ def _behavior(one: Dna, other: Dna) -> str | None:
         return "its GUI controls drive other raw controls"
     if not _same(one.animated_maps.conditionals, other.animated_maps.conditionals, conditionals):
         return "its animated maps are driven otherwise"
-    for group in (*one.joint_groups, *other.joint_groups):
-        if any(int(i) >= 9 * len(one.joint_names) for i in group.output_indices):
-            return "joints that turn by quaternions cannot be mixed"
     for field, word in _OTHERS.items():
-        a, b = Dna(), Dna()
-        setattr(a, field, getattr(one, field))
-        setattr(b, field, getattr(other, field))
-        if a.to_bytes() != b.to_bytes():
+        if not alike(getattr(one, field), getattr(other, field)):
             return f"its {word} are others"
+    if _turned_lists(one) != _turned_lists(other):
+        return "joints that turn by quaternions have their controls in another order"
     return None
 
 
+def alike(one: object, other: object) -> bool:
+    """Whether two parts of faces hold the same numbers and texts, all the way down.
+
+    Args:
+        one: a part: an array, a text, a number, a list of parts, or what has parts as attributes.
+        other: of the same kind.
+    """
+    if isinstance(one, np.ndarray):
+        return bool(one.tobytes() == np.asarray(other).tobytes())
+    if isinstance(one, str | bytes | int | float):
+        return repr(one) == repr(other)  # of all its digits, and of no number too
+    if isinstance(one, Sequence):
+        assert isinstance(other, Sequence)
+        return len(one) == len(other) and all(map(alike, one, other))
+    names = [name for name in vars(type(one)) if not name.startswith("_")]
+    return all(alike(getattr(one, name), getattr(other, name)) for name in names)
+
+
+def turned_groups(dna: Dna) -> list[int]:
+    """Numbers of the joint groups that turn a joint by quaternions.
+
+    Args:
+        dna: a face.
+    """
+    kinds = np.asarray(dna.joint_behavior_metadata.joint_representations)
+    if not len(kinds):
+        return []
+    turned = np.flatnonzero(kinds[:, 1] == _QUATERNION)
+    return [
+        number
+        for number, group in enumerate(dna.joint_groups)
+        if np.isin(np.asarray(group.output_indices) // 9, turned).any()
+    ]
+
+
+def _turned_lists(dna: Dna) -> list[tuple[bytes, ...]]:
+    """Quaternions are multiplied in the order of the columns, so a mean of columns in two orders
+    would mean nothing: these lists have to be the same."""
+    groups = dna.joint_groups
+    return [
+        (g.lods.tobytes(), g.input_indices.tobytes(), g.output_indices.tobytes())
+        for g in (groups[number] for number in turned_groups(dna))
+    ]
+
+
 def _meshes(one: Dna, other: Dna) -> str | None:
-    for name, a, b in zip(one.mesh_names, one.meshes, other.meshes, strict=True):
+    if len(one.meshes) != len(other.meshes):
+        return f"it has {counted(len(other.meshes), 'mesh')}, not {len(one.meshes)}"
+    for name, a, b in zip(one.mesh_names, one.meshes, other.meshes, strict=False):
         counts = [_counts(m) for m in (a, b)]
         if counts[0] != counts[1]:
             return f"{name} has {counts[1][0]} vertices and {counts[1][1]} faces, not " + (
                 f"{counts[0][0]} and {counts[0][1]}"
             )
-        if not _same(a, b, _TOPOLOGY):
+        same = all(len(getattr(a, v)) == len(getattr(b, v)) for v in _VALUES)
+        if not same or not _same(a, b, _TOPOLOGY):
             return f"{name} has its faces in another order"
     return None
 

@@ -12,11 +12,14 @@ import re
 import numpy as np
 
 from .. import Dna, Mesh
-from ..author.geometry.skeleton import Doubles
+from ..author.geometry.skeleton import Doubles, Ints
+from ..base.budget import BASE_BYTES, BYTES_PER_BYTE, Budget
 
 _OWN = re.compile(r"(hair|beard)_lod\d+_mesh")
 _NEAR = 4  # vertices of the skin that a vertex of hair goes with
-_CHUNK = 256
+_CELLS = 1 << 22  # of distances that are held at once
+_BASE_STEPS = 1 << 28
+_STEPS_PER_BYTE = 256
 
 
 def hair_meshes(dna: Dna) -> list[int]:
@@ -63,17 +66,17 @@ def give_hair(out: Dna, leading: Dna) -> None:
     own = hair_meshes(leading)
     if not own:
         return
-    mapping = leading.lod_mesh_mapping
+    mapping, budget = leading.lod_mesh_mapping, budget_of(leading)
     meshes = list(out.meshes)
     for number in own:
         lods = [lod for lod in range(len(mapping)) if number in [int(m) for m in mapping[lod]]]
         skin = _skin(leading, [int(m) for m in mapping[lods[0]]] if lods else [])
         mesh = copy.copy(leading.meshes[number])
-        if skin is not None:
+        if skin is not None and len(leading.meshes[skin].positions):
             before, after = (
                 np.asarray(d.meshes[skin].positions, np.float64) for d in (leading, out)
             )
-            mesh.positions = _moved(mesh, before, after - before)
+            mesh.positions = _moved(mesh, before, after - before, budget)
         meshes.append(mesh)
     out.meshes = meshes
     out.mesh_names = list(leading.mesh_names)
@@ -91,15 +94,47 @@ def _skin(dna: Dna, listed: list[int]) -> int | None:
     return max(heads or there, key=lambda m: len(dna.meshes[m].positions), default=None)
 
 
-def _moved(mesh: Mesh, skin: Doubles, shift: Doubles) -> Doubles:
+def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles:
     """float64[V, 3]: positions of hair, each moved as the skin nearest to it."""
     points = np.asarray(mesh.positions, np.float64)
-    out = points.copy()
-    for begin in range(0, len(points), _CHUNK):
-        rows = slice(begin, begin + _CHUNK)
-        square = ((points[rows, None] - skin[None]) ** 2).sum(axis=2)
-        near = np.argpartition(square, _NEAR, axis=1)[:, :_NEAR]
-        weight = 1 / (np.take_along_axis(square, near, axis=1) + 1e-6)
-        weight /= weight.sum(axis=1, keepdims=True)
-        out[rows] += np.einsum("nk,nkx->nx", weight, shift[near])
+    near = nearest(points, skin, min(_NEAR, len(skin)), budget)
+    square = ((points[:, None] - skin[near]) ** 2).sum(axis=2)
+    weight = 1 / (square + 1e-6)
+    weight /= weight.sum(axis=1, keepdims=True)
+    return points + np.einsum("nk,nkx->nx", weight, shift[near])
+
+
+def budget_of(dna: Dna) -> Budget:
+    """What mixing a face may take: as much as compiling it, see native/README.md.
+
+    Args:
+        dna: the face.
+    """
+    size = dna.size_in_bytes()
+    return Budget(BASE_BYTES + BYTES_PER_BYTE * size, _BASE_STEPS + _STEPS_PER_BYTE * size)
+
+
+def nearest(points: Doubles, others: Doubles, count: int, budget: Budget) -> Ints:
+    """int64[n, count]: which of the others are nearest to each point, in any order.
+
+    Args:
+        points: float64[n, 3].
+        others: float64[m, 3].
+        count: how many of them, from 1 to m.
+        budget: of the face.
+
+    Raises:
+        BudgetError: more pairs than the face's size lets expect.
+    """
+    budget.work(len(points) * len(others) / 8, "vertices near others")
+    lengths = (others**2).sum(axis=1)
+    rows = max(1, _CELLS // max(1, len(others)))
+    out = np.zeros((len(points), count), np.int64)
+    for begin in range(0, len(points), rows):
+        part = slice(begin, begin + rows)
+        square = lengths - 2 * points[part] @ others.T
+        if count == 1:
+            out[part, 0] = square.argmin(axis=1)
+        else:
+            out[part] = np.argpartition(square, count - 1, axis=1)[:, :count]
     return out

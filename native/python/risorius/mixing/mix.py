@@ -14,13 +14,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .. import BlendShapeTarget, Dna, JointGroup, Mesh
+from .. import BlendShapeTarget, Dna, Mesh
 from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles
 from ..base.errors import ArgumentError
 from ..rigs.rotation import Convention
+from .compatible import alike
+from .groups import mixed_groups
 from .hair import give_hair, without_hair
 from .regions import REGIONS, Masks
+from .share import Share, mean_of
 
 
 @dataclass
@@ -98,53 +101,32 @@ def mix_faces(
             raise ArgumentError(f"no vertex of {parents[0].name} is of the region {region}")
     places = Places(parents, mix, masks)
     out = copy.copy(parents[0])
-    out.meshes = [
-        _mesh([p.meshes[m] for p in parents], places.of(part), len(out.joint_names))
-        for m, part in enumerate(masks.meshes)
-    ]
-    of_joints = places.of(_joint_masks(parents[0], masks))
+    meshes = [p.meshes for p in parents]
+    out.meshes = [_mesh(row, places.of_mesh(m)) for m, row in enumerate(zip(*meshes, strict=True))]
+    of_joints = places.of_joints()
     _neutral_pose(out, parents, of_joints)
-    out.joint_groups = _joint_groups(out, parents, of_joints)
+    out.joint_groups = mixed_groups(parents, of_joints)
     _maps(out, parents, mix.whole())
     _descriptor(out, parents, mix.whole(), most, name)
     give_hair(out, leading)
     return out
 
 
-@dataclass
-class Share:
-    """What points have of each parent.
-
-    Attributes:
-        weights: float64[n, P], rows sum to 1.
-        scaled: float64[n, P], the same times the size that each parent's lengths get.
-        shift: float64[n, 3], what is added to places.
-    """
-
-    weights: Doubles
-    scaled: Doubles
-    shift: Doubles
-
-    def places(self, points: Sequence[object]) -> Doubles:
-        """float64[n, 3] of the parents' points.
-
-        Args:
-            points: float64[n, 3] of each parent.
-        """
-        return _mean(points, self.scaled) + self.shift
-
-
 class Places:
-    """Shares of points by what they have of the regions."""
+    """Shares of points by what they have of the regions; without regions masks are not needed."""
 
     def __init__(self, parents: Sequence[Dna], mix: Mix, masks: Masks) -> None:
         self.table = mix.table()
         self.own = np.array([region in mix.regions for region in REGIONS])
         self.whole = mix.whole()
+        self._first, self._masks = parents[0], masks
+        if not self.own.any():
+            return
         skin = masks.skin
         positions = [np.asarray(p.meshes[skin].positions, np.float64) for p in parents]
         part = masks.meshes[skin]
-        face = 1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]
+        # Of shares whose sum is 1 but for rounding.
+        face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
         # Where two regions meet is what has to fit: rims lie upon each other.
@@ -158,15 +140,28 @@ class Places:
         middles = np.stack([_middles(p, rims) for p in positions])  # [P, regions, 3]
         self.shifts = _middles(mixed, rims) - self.sizes[:, :, None] * middles
 
-    def of(self, masks: Doubles) -> Share:
-        """Of some points.
+    def of_mesh(self, mesh: int) -> Share:
+        """Of the vertices of a mesh.
 
         Args:
-            masks: float64[n, regions], rows sum to 1.
+            mesh: its number.
         """
         if not self.own.any():
-            rows = np.tile(self.whole, (len(masks), 1))
-            return Share(rows, rows, np.zeros((len(masks), 3)))
+            return self._everywhere(len(self._first.meshes[mesh].positions))
+        return self._of(self._masks.meshes[mesh])
+
+    def of_joints(self) -> Share:
+        """Of the joints."""
+        if not self.own.any():
+            return self._everywhere(len(self._first.joint_names))
+        return self._of(_joint_masks(self._first, self._masks))
+
+    def _everywhere(self, count: int) -> Share:
+        rows = np.tile(self.whole, (count, 1))
+        return Share(rows, rows, np.zeros((count, 3)))
+
+    def _of(self, masks: Doubles) -> Share:
+        """Of points that have so much of the regions: float64[n, regions], rows sum to 1."""
         parts = masks * self.own
         rest = (1 - parts.sum(axis=1, keepdims=True)).clip(0) * self.whole
         inside = parts @ self.table
@@ -197,20 +192,12 @@ def _descriptor(
     out.metadata = dict(leading.metadata)
 
 
-def _mean(values: Sequence[object], weights: Doubles) -> Doubles:
-    """float64[n, ...]: the mean of arrays of the same shape by float64[n, P] weights of rows."""
-    rows = [np.asarray(v, np.float64) for v in values]
-    shape = (-1, *[1] * (rows[0].ndim - 1))
-    return np.asarray(sum(weights[:, p].reshape(shape) * row for p, row in enumerate(rows)))
-
-
-def _mesh(parents: Sequence[Mesh], share: Share, joints: int) -> Mesh:
+def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
     """A mesh between those of the parents.
 
     Args:
         parents: of one topology.
         share: of its vertices.
-        joints: how many there are.
     """
     first, weights = parents[0], share.weights
     out = copy.copy(first)
@@ -223,15 +210,17 @@ def _mesh(parents: Sequence[Mesh], share: Share, joints: int) -> Mesh:
         count = len(getattr(first, values))
         vertex = np.zeros(count, np.int64)
         vertex[np.asarray(layout, np.int64)] = corners
-        setattr(out, values, _mean([getattr(m, values) for m in parents], weights[vertex]))
+        setattr(out, values, mean_of([getattr(m, values) for m in parents], weights[vertex]))
     mixed = np.asarray(out.normals, np.float64)
     length = np.linalg.norm(mixed, axis=1, keepdims=True)
-    # Of one parent alone normals stay as they are, also where they are not quite 1 long.
+    # Normals that all have, or one parent alone, stay as they are, also if they are not 1 long.
     alone = (weights == 1).any(axis=1).all()
-    if not alone:
+    if not alone and not all(np.array_equal(first.normals, m.normals) for m in parents[1:]):
         out.normals = mixed / np.where(length > 0, length, 1)
-    out.blend_shape_targets = _targets(parents, share.scaled)
-    _skin(out, parents, weights, joints)
+    targets = [m.blend_shape_targets for m in parents]
+    if not share.is_whole or not all(alike(targets[0], own) for own in targets[1:]):
+        out.blend_shape_targets = _targets(parents, share.scaled)
+    _skin(out, parents, weights)
     return out
 
 
@@ -243,25 +232,27 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
     channels = list(dict.fromkeys(c for targets in own for c in targets))
     out = []
     for channel in channels if len(own[0]) == len(channels) else sorted(channels):
-        delta = np.zeros((len(weights), 3))
-        moved = np.zeros(len(weights), bool)
+        vertices, deltas = [np.zeros(0, np.int64)], [np.zeros((0, 3))]
         for p, targets in enumerate(own):
             if channel in targets:
                 at = np.asarray(targets[channel].vertex_indices, np.int64)
                 share = weights[at, p]
-                np.add.at(delta, at, share[:, None] * np.asarray(targets[channel].deltas))
-                moved[at[share > 0]] = True
-        rows = np.flatnonzero(moved)
+                vertices.append(at[share > 0])
+                moved = share[:, None] * np.asarray(targets[channel].deltas)
+                deltas.append(moved[share > 0])
+        rows, place = np.unique(np.concatenate(vertices), return_inverse=True)
         if len(rows):
+            delta = np.zeros((len(rows), 3))
+            np.add.at(delta, place.ravel(), np.concatenate(deltas))
             out.append(
                 BlendShapeTarget(
-                    deltas=delta[rows], vertex_indices=rows, blend_shape_channel_index=channel
+                    deltas=delta, vertex_indices=rows, blend_shape_channel_index=channel
                 )
             )
     return out
 
 
-def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles, joints: int) -> None:
+def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
     """Skin weights; where the parents have the same ones, these."""
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
@@ -270,16 +261,25 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles, joints: int) -> 
         for name in fields
     ):
         return
-    rows = _mean([sk.dense_weights(mesh, joints) for mesh in parents], weights)
+    entries = [sk.skin_entries(mesh) for mesh in parents]
+    # One number for each vertex and joint, in their order.
+    keys = np.concatenate([vertex << 16 | joint for vertex, joint, _ in entries])
+    parts = [weight * weights[vertex, p] for p, (vertex, _, weight) in enumerate(entries)]
+    keys, place = np.unique(keys, return_inverse=True)
+    weight = np.bincount(place.ravel(), weights=np.concatenate(parts))
+    vertex, joint = keys >> 16, keys & 0xFFFF
+    # The smallest beyond what a parent has at most are left out.
     most = max(int(mesh.maximum_influence_per_vertex) for mesh in parents)
-    if joints > most:  # the smallest beyond what a parent has at most are left out
-        least = np.partition(rows, joints - most, axis=1)[:, [joints - most]]
-        rows = np.where(rows >= least, rows, 0)
-    rows /= rows.sum(axis=1, keepdims=True)
-    vertex, joint = np.nonzero(rows)
-    counts = (rows > 0).sum(axis=1)
+    first = np.searchsorted(vertex, vertex)
+    rank = np.zeros(len(keys), np.int64)
+    rank[np.lexsort((-weight, vertex))] = np.arange(len(keys))
+    kept = (rank - first < most) & (weight > 0)
+    vertex, joint, weight = vertex[kept], joint[kept], weight[kept]
+    count = len(out.positions)
+    counts = np.bincount(vertex, minlength=count)
+    total = np.bincount(vertex, weights=weight, minlength=count)
     out.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
-    out.skin_joint_indices, out.skin_weights = joint, rows[vertex, joint]
+    out.skin_joint_indices, out.skin_weights = joint, weight / total[vertex]
     out.maximum_influence_per_vertex = int(counts.max(initial=0))
 
 
@@ -292,11 +292,14 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
     """
     count = len(dna.joint_names)
     sums, held = np.zeros((count, len(REGIONS))), np.zeros(count)
-    listed = dna.lod_mesh_mapping
-    for m in listed[0] if len(listed) else range(len(dna.meshes)):
-        rows = sk.dense_weights(dna.meshes[int(m)], count)
-        sums += rows.T @ masks.meshes[int(m)]
-        held += rows.sum(axis=0)
+    listed, meshes = dna.lod_mesh_mapping, dna.meshes
+    for m in listed[0].tolist() if len(listed) else range(len(meshes)):
+        if m >= len(meshes):
+            continue
+        vertex, holds, weight = sk.skin_entries(meshes[m])
+        held += np.bincount(holds, weights=weight, minlength=count)
+        for region, part in enumerate(masks.meshes[m].T):
+            sums[:, region] += np.bincount(holds, weights=weight * part[vertex], minlength=count)
     for joint in reversed(sk.parent_order(dna)):  # a joint without skin is as those below it
         parent = int(dna.joint_parents[joint])
         if parent != joint and held[parent] < 1e-6 and held[joint] > 0:
@@ -318,7 +321,7 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
     rest = np.zeros((count, 9))
     places = [sk.world_matrices(p, rest)[:, :3, 3] for p in parents]
     world = share.places(places)
-    local = _mean(shifts, weights)
+    local = mean_of(shifts, weights)
     # Where nothing is moved or turned, the mean of the places is the mean of the shifts.
     alike = all(np.array_equal(turns[0], t) for t in turns[1:]) and not share.shift.any()
     frames = np.tile(np.eye(4), (count, 1, 1))
@@ -353,82 +356,6 @@ def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
             total += share * (q if q @ quaternions[0] >= 0 else -q)
         rows[joint] = convention.angles(total / np.linalg.norm(total))
     return rows
-
-
-def _joint_groups(out: Dna, parents: Sequence[Dna], share: Share) -> list[JointGroup]:
-    """What controls do to joints: the mean of each row of the joint matrix.
-
-    Groups of the parents that share a joint become one, with the rows and columns of all.
-    """
-    groups = []
-    for own in _together(parents):
-        parts = [
-            [g for g, at in zip(p.joint_groups, numbers, strict=True) if at]
-            for p, numbers in zip(parents, own, strict=True)
-        ]
-        group = _joint_group(parts, share, max(1, out.lod_count))
-        if group is not None:
-            groups.append(group)
-    return groups
-
-
-def _together(parents: Sequence[Dna]) -> list[list[list[bool]]]:
-    """Which joint groups of each parent come together: bool[parents][groups] of each new group."""
-    sets = [[frozenset(map(int, g.joint_indices)) for g in p.joint_groups] for p in parents]
-    joined: list[set[int]] = []
-    for joints in [own for rows in sets for own in rows if own]:
-        met = [known for known in joined if known & joints]
-        joined = [known for known in joined if not known & joints] + [set(joints).union(*met)]
-    joined.sort(key=min)
-    return [[[bool(own & known) for own in rows] for rows in sets] for known in joined]
-
-
-def _joint_group(
-    parts: Sequence[Sequence[JointGroup]], share: Share, levels: int
-) -> JointGroup | None:
-    """One group of those of the parents: the union of their rows and columns."""
-    weights = share.weights
-    last: dict[int, int] = {}  # row -> how many levels have it
-    columns: dict[int, None] = {}
-    joints: dict[int, None] = {}
-    for p, groups in enumerate(parts):
-        for group in groups:
-            joints |= dict.fromkeys(map(int, group.joint_indices))
-            rows = np.asarray(group.output_indices, np.int64)
-            if not (weights[rows // 9, p] > 0).any():
-                continue
-            columns |= dict.fromkeys(map(int, group.input_indices))
-            lods = [int(group.lods[min(lod, len(group.lods) - 1)]) for lod in range(levels)]
-            for at, row in enumerate(rows.tolist()):
-                last[row] = max(last.get(row, 0), sum(at < n for n in lods))
-    if not last or not columns:
-        return None
-    order = sorted(last, key=lambda row: -last[row])
-    inputs = sorted(columns)
-    values = np.zeros((len(order), len(inputs)))
-    row_of = {row: at for at, row in enumerate(order)}
-    column_of = {column: at for at, column in enumerate(inputs)}
-    for p, groups in enumerate(parts):
-        for group in groups:
-            own = [(i, int(r)) for i, r in enumerate(group.output_indices) if int(r) in row_of]
-            used = [(i, int(c)) for i, c in enumerate(group.input_indices) if int(c) in column_of]
-            if not own or not used:
-                continue
-            joints_of = np.array([r // 9 for _, r in own])
-            shifts = np.array([r % 9 < 3 for _, r in own])
-            part = np.where(shifts, share.scaled[joints_of, p], weights[joints_of, p])
-            read = np.ix_([i for i, _ in own], [i for i, _ in used])
-            block = np.asarray(group.values, np.float64)[read]
-            place = np.ix_([row_of[r] for _, r in own], [column_of[c] for _, c in used])
-            values[place] += part[:, None] * block
-    counts = np.array([last[row] for row in order])
-    return JointGroup(
-        lods=[int((counts > lod).sum()) for lod in range(levels)],
-        input_indices=inputs,
-        output_indices=order,
-        values=values.astype(np.float32),
-        joint_indices=sorted(joints),
-    )
 
 
 def _maps(out: Dna, parents: Sequence[Dna], shares: Doubles) -> None:

@@ -8,15 +8,18 @@ whole, what lies on the skin (lashes, films) that of the skin beside it.
 
 from __future__ import annotations
 
+import functools
 import re
 
 import numpy as np
 
 from .. import Dna, Mesh
 from ..author.geometry import skeleton as sk
-from ..author.geometry.skeleton import Doubles, Ints
+from ..author.geometry.motion import Mover, motions_of
+from ..author.geometry.skeleton import Doubles
+from ..base.budget import Budget
 from ..controls.regions import region_of
-from .hair import without_hair
+from .hair import budget_of, nearest, without_hair
 
 # Region -> regions of controls, see controls/regions.toml.
 _CONTROLS = {
@@ -41,43 +44,45 @@ _RIGID = {
 
 
 class Masks:
-    """Soft masks of the regions on all meshes of a face.
+    """Soft masks of the regions on all meshes of a face; found when they are first asked for.
 
     Attributes:
         meshes: float64[V, regions] of each mesh, without those of hair_meshes.
         skin: the face's own mesh of the finest level.
     """
 
-    def __init__(self, dna: Dna) -> None:
-        dna = without_hair(dna)
-        controls = len(dna.raw_control_names)
-        motions = sk.column_motions(dna, sk.column_count(dna))[:controls]
-        skins: dict[int, int] = {}  # level -> the largest mesh that moves by itself
-        self.meshes: list[Doubles] = [np.zeros((0, len(REGIONS)))] * len(dna.meshes)
-        listed = dna.lod_mesh_mapping
-        for lod in range(len(listed)):
-            rows = [int(m) for m in listed[lod]]
-            free = [m for m in rows if _rigid(dna.mesh_names[m]) is None]
+    def __init__(self, dna: Dna, budget: Budget | None = None) -> None:
+        """Args:
+        dna: the face.
+        budget: what finding them may take; None: as budget_of says.
+        """
+        self._dna, self._budget = without_hair(dna), budget
+        listed, count = self._dna.lod_mesh_mapping, len(self._dna.meshes)
+        self._levels = [[int(m) for m in listed[lod] if m < count] for lod in range(len(listed))]
+        self._skins: dict[int, int] = {}  # level -> the largest mesh that moves by itself
+        for lod, rows in enumerate(self._levels):
+            free = [m for m in rows if _rigid(self._dna.mesh_names[m]) is None]
             if free:
-                skins[lod] = max(free, key=lambda m: len(dna.meshes[m].positions))
-        self.skin = skins[0] if skins else 0
-        for m in set(skins.values()):
-            self.meshes[m] = _skin_masks(dna, dna.meshes[m], motions)
-        for lod, skin in skins.items():
-            for m in (int(m) for m in listed[lod]):
-                if not len(self.meshes[m]):
-                    self.meshes[m] = self._others(dna, m, skin)
-        for m, mesh in enumerate(dna.meshes):  # of no level
-            if not len(self.meshes[m]):
-                self.meshes[m] = np.tile(np.eye(len(REGIONS))[-1], (len(mesh.positions), 1))
+                self._skins[lod] = max(free, key=lambda m: len(self._dna.meshes[m].positions))
+        self.skin = self._skins.get(0, 0)
 
-    def _others(self, dna: Dna, mesh: int, skin: int) -> Doubles:
-        positions = np.asarray(dna.meshes[mesh].positions, np.float64)
-        region = _rigid(dna.mesh_names[mesh])
-        if region is not None:
-            return np.tile(np.eye(len(REGIONS))[REGIONS.index(region)], (len(positions), 1))
-        near = _nearest(positions, np.asarray(dna.meshes[skin].positions, np.float64))
-        return self.meshes[skin][near]
+    @functools.cached_property
+    def meshes(self) -> list[Doubles]:
+        """As the class says. Raises: BudgetError: the face asks for more work than its size."""
+        dna, budget = self._dna, self._budget or budget_of(self._dna)
+        skins = sorted(set(self._skins.values()))
+        out = dict(
+            zip(skins, _skin_masks(dna, [dna.meshes[m] for m in skins], budget), strict=True)
+        )
+        for lod, skin in self._skins.items():
+            for m in self._levels[lod]:
+                if m not in out:
+                    out[m] = _others(dna, m, skin, out[skin], budget)
+        rest = np.eye(len(REGIONS))[-1]
+        return [
+            out[m] if m in out else np.tile(rest, (len(mesh.positions), 1))  # of no level
+            for m, mesh in enumerate(dna.meshes)
+        ]
 
     def is_empty(self, region: str) -> bool:
         """Whether a region has no vertex.
@@ -89,46 +94,65 @@ class Masks:
         return not any((masks[:, at] > 0.5).any() for masks in self.meshes)
 
 
+def _others(dna: Dna, mesh: int, skin: int, masks: Doubles, budget: Budget) -> Doubles:
+    """float64[V, regions] of what lies on a skin or is rigid."""
+    positions = np.asarray(dna.meshes[mesh].positions, np.float64)
+    region = _rigid(dna.mesh_names[mesh])
+    if region is not None:
+        return np.tile(np.eye(len(REGIONS))[REGIONS.index(region)], (len(positions), 1))
+    others = np.asarray(dna.meshes[skin].positions, np.float64)
+    return masks[nearest(positions, others, 1, budget)[:, 0]]
+
+
 def _rigid(name: str) -> str | None:
     return next((region for word, region in _RIGID.items() if word.search(name)), None)
 
 
-def _skin_masks(dna: Dna, mesh: Mesh, motions: Doubles) -> Doubles:
-    """float64[V, regions] of the face's own mesh."""
-    positions = np.asarray(mesh.positions, np.float64)
-    weights = sk.dense_weights(mesh, len(dna.joint_names))
-    shapes = sk.column_shapes(dna, mesh, len(motions))
-    most = np.zeros((len(positions), len(REGIONS)))
-    most[:, -1] = _LEAST
-    for column, control in enumerate(dna.raw_control_names):
+def _skin_masks(dna: Dna, meshes: list[Mesh], budget: Budget) -> list[Doubles]:
+    """float64[V, regions] of a face's own meshes, one for each level or for several."""
+    regions = _regions_of_controls(dna)
+    most = [np.zeros((len(mesh.positions), len(REGIONS))) for mesh in meshes]
+    movers = [Mover(dna, mesh) for mesh in meshes]
+    for rows in most:
+        rows[:, -1] = _LEAST
+    for motion in motions_of(dna, list(regions), budget):
+        at = regions[motion.column]
+        for mover, rows in zip(movers, most, strict=True):
+            vertices, shifts = mover.moved(motion, budget)
+            far = np.linalg.norm(shifts, axis=1)
+            if far.max(initial=0) > 0:
+                rows[vertices, at] = np.maximum(rows[vertices, at], far / far.max())
+    below = np.zeros(len(dna.joint_names))
+    below[_below_head(dna)] = 1
+    out = []
+    for mover, mesh, rows in zip(movers, meshes, most, strict=True):
+        neck = mover.sums(below)[:, None]
+        masks = _shares(rows) * (1 - neck) + neck * np.eye(len(REGIONS))[REGIONS.index("neck")]
+        out.append(_evened(mesh, masks))
+    return out
+
+
+def _regions_of_controls(dna: Dna) -> dict[int, int]:
+    """Raw controls that have a region -> its number."""
+    out = {}
+    for number, control in enumerate(dna.raw_control_names):
         region = "cheek" if "cheek" in control.lower() else region_of(control)
         at = next((i for i, own in enumerate(_CONTROLS.values()) if region in own), None)
-        if at is None:
-            continue
-        moved = sk.skinned(positions + shapes.get(column, 0.0), weights, motions[column])
-        far = np.linalg.norm(moved - positions, axis=1)
-        if far.max(initial=0) > 0:
-            most[:, at] = np.maximum(most[:, at], far / far.max())
-    masks = _shares(most)
-    neck = weights[:, _below_head(dna)].sum(axis=1, keepdims=True)
-    return _evened(mesh, masks * (1 - neck) + neck * np.eye(len(REGIONS))[REGIONS.index("neck")])
+        if at is not None:
+            out[number] = at
+    return out
 
 
 def _below_head(dna: Dna) -> list[int]:
     """The joints that hang on a neck or a spine and on no head."""
-    out = []
-    for joint in range(len(dna.joint_names)):
-        at, steps = joint, 0
-        while steps < len(dna.joint_names):
-            name = dna.joint_names[at].lower()
-            if "head" in name or int(dna.joint_parents[at]) == at:
-                break
-            if _NECK.search(name):
-                break
-            at, steps = int(dna.joint_parents[at]), steps + 1
-        if _NECK.search(dna.joint_names[at].lower()):
-            out.append(joint)
-    return out
+    names, parents = [name.lower() for name in dna.joint_names], dna.joint_parents
+    below = [False] * len(names)
+    for joint in sk.parent_order(dna):
+        parent = int(parents[joint])
+        of_neck = _NECK.search(names[joint]) is not None
+        hangs = "head" not in names[joint] and parent != joint and below[parent]
+        below[joint] = of_neck or hangs
+    return [joint for joint, is_below in enumerate(below) if is_below]
 
 
 def _shares(amounts: Doubles) -> Doubles:
@@ -139,11 +163,15 @@ def _shares(amounts: Doubles) -> Doubles:
 def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
     """Each vertex with its neighbours, again and again; what is mostly one region then is so."""
     edges = sk.mesh_edges(mesh).astype(np.int64)
+    if not len(edges):
+        return masks
     count = np.bincount(edges.ravel(), minlength=len(masks))[:, None] + 1.0
     positions = np.asarray(mesh.positions, np.float64)
     length = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1).mean()
     reach = _REACH * np.ptp(positions, axis=0).max() / max(float(length), 1e-30)
-    for _ in range(min(_MOST_ROUNDS, round(1.5 * reach**2))):
+    # Of no number where a vertex lies at none: nothing is evened out there.
+    rounds = round(min(_MOST_ROUNDS, 1.5 * reach**2)) if np.isfinite(reach) else 0
+    for _ in range(rounds):
         around = masks.copy()
         for column in range(masks.shape[1]):
             for a, b in ((0, 1), (1, 0)):
@@ -152,12 +180,3 @@ def _evened(mesh: Mesh, masks: Doubles) -> Doubles:
                 )
         masks = around / count
     return _shares(masks)
-
-
-def _nearest(points: Doubles, others: Doubles) -> Ints:
-    lengths = (others**2).sum(axis=1)
-    rows = [
-        (lengths - 2 * points[at : at + 256] @ others.T).argmin(axis=1)
-        for at in range(0, len(points), 256)
-    ]
-    return np.concatenate(rows) if rows else np.zeros(0, np.int64)

@@ -3,25 +3,37 @@
 
 Skin has one tone: its pictures are mixed by the shares of the whole, also where a region has
 others; those of eyes by the shares of their region. Only pictures that this package wrote are
-mixed; of others the leading parent's file is taken as it is.
+mixed, and those of hair are not, as hair is one parent's own; of others the leading parent's file
+is taken as it is.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from .. import Dna
 from ..author.geometry.skeleton import Doubles
+from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from ..base.reading import ReadingError, read_file
 from ..files.names import folded, is_file_name
-from ..files.png import png, read_png
+from ..files.png import Pixels, has_opacity, pixels_of, pixels_to_png, read_pixels
 from .hair import without_hair
 from .mix import Mix
 from .regions import Masks
 
+WHY = {
+    "missing": "not every face has them",
+    "opacity": "they have opacity, as hair has",
+    "format": "Risorius mixes its own kind of PNG alone",
+    "size": "the faces have them in different sizes",
+}
+"""Why pictures are the leading parent's own."""
 _KEY = "texture:"
 _MOST_BYTES = 1 << 28  # of a picture
 _MASKS = "*_msk.png"  # of wrinkles, which are known by their names alone
@@ -38,7 +50,7 @@ def texture_folder(path: Path) -> Path:
 
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
-) -> tuple[dict[str, bytes], list[str]]:
+) -> tuple[dict[str, bytes], dict[str, str]]:
     """The textures that the leading parent's metadata name.
 
     Args:
@@ -48,14 +60,16 @@ def mix_textures(
         masks: of the first one's regions.
 
     Returns:
-        File name -> bytes, and the names of those that could not be mixed and are the leading
-        parent's own.
+        File name -> bytes; and of those that are the leading parent's own, name -> why, see WHY.
+
+    Raises:
+        BudgetError: pictures that say in a few bytes that they are huge.
     """
     whole = mix.whole()
     most = int(whole.argmax())
     meshes = list(without_hair(parents[0]).mesh_names)
     files: dict[str, bytes] = {}
-    own: list[str] = []
+    own: dict[str, str] = {}
     taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
@@ -66,17 +80,17 @@ def mix_textures(
         leading = data[most]
         if leading is None:
             continue
-        part = masks.meshes[meshes.index(mesh)]
-        rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
-        shares = mix.table()[int(part[0].argmax())] if rigid else whole
-        mixed = _mixed(data, shares)
-        files[name] = leading if mixed is None else mixed
+        shares = _shares(mix, masks, meshes.index(mesh))
+        why = _why_not(data, shares)
+        mixed = b"" if why else _mixed(data, shares)
+        files[name] = mixed or leading
         taken.add(folded(name))
-        if mixed is None:
-            own.append(name)
+        if not mixed:
+            own[name] = why or "format"
     for mask in sorted(texture_folder(paths[most]).glob(_MASKS)):
         data = [_bytes(path, mask.name) for path in paths]
-        files[mask.name] = _mixed(data, whole) or read_file(mask, _MOST_BYTES, found=True)
+        mixed = b"" if _why_not(data, whole) else _mixed(data, whole)
+        files[mask.name] = mixed or read_file(mask, _MOST_BYTES, found=True)
     return files, own
 
 
@@ -99,6 +113,13 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
             )
 
 
+def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
+    """float64[P]: of the pictures of a mesh; what is rigid has those of its region."""
+    part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
+    rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
+    return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())
+
+
 def _data(parent: Dna, path: Path, key: str) -> bytes | None:
     name = parent.metadata.get(key, "")
     return _bytes(path, name) if is_file_name(name) else None
@@ -112,13 +133,34 @@ def _bytes(path: Path, name: str) -> bytes | None:
     return None
 
 
-def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes | None:
-    """A picture of the parents' pictures, or None where they do not go together."""
-    counted = [i for i, share in enumerate(shares) if share > 0]
-    images = {i: read_png(data[i] or b"") for i in counted}
-    shapes = {None if image is None else image.shape for image in images.values()}
-    if len(shapes) != 1 or None in shapes:
-        return None
+def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
+    """Why pictures of the parents do not go together; empty where they do."""
+    counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
+    if None in counted:
+        return "missing"
+    files = [found or b"" for found in counted]
+    if any(has_opacity(file) for file in files):
+        return "opacity"
+    shapes = {pixels_of(file) for file in files}
+    if None in shapes:
+        return "format"
+    return "" if len(shapes) == 1 else "size"
+
+
+def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes:
+    """A picture of the parents' pictures, which go together; empty where one is damaged."""
+    counted = {i: data[i] or b"" for i, share in enumerate(shares) if share > 0}
     if len(counted) == 1:
-        return data[counted[0]]
-    return png(sum(shares[i] * image for i, image in images.items() if image is not None))
+        return next(iter(counted.values()))
+    sizes = [math.prod(pixels_of(file) or (0,)) for file in counted.values()]
+    Budget.of(sum(map(len, counted.values()))).hold(sum(sizes), "pictures of the faces")
+    images: dict[int, Pixels] = {}
+    for i, file in counted.items():
+        image = read_pixels(file)
+        if image is None:
+            return b""
+        images[i] = image
+    out = np.empty_like(next(iter(images.values())))
+    for row in range(len(out)):
+        out[row] = np.rint(sum(shares[i] * image[row] for i, image in images.items()))
+    return pixels_to_png(out)

@@ -159,6 +159,7 @@ def solve_clip(
         CancelledError: progress said False.
     """
     wanted = _meshes("frames", surface, frames, 3)
+    surface.check_size(min(most_points, sum(surface.vertex_counts[m] for m in wanted)))
     count = _frame_count(wanted)
     checked("rate", finite, rate, 0.01, 1e6)
     checked("start", finite, start, -1e9, 1e9)
@@ -407,6 +408,8 @@ def _points(
 def _meshes(
     name: str, surface: Surface, values: npt.ArrayLike | Mapping[int, npt.ArrayLike], axes: int
 ) -> dict[int, Floats]:
+    if not surface.mesh_indices:
+        raise ArgumentError(f"{name}: a face with meshes at LOD {surface.lod} was expected")
     given = values if isinstance(values, Mapping) else {surface.mesh_indices[0]: values}
     out = {}
     for mesh, value in given.items():

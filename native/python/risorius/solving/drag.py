@@ -129,6 +129,7 @@ def _drag(
     low, high = np.minimum(low, raw), np.maximum(high, raw)
     loose = vector("free", True if free is None else free, len(raw)).astype(bool)
     low[~loose] = high[~loose] = raw[~loose]
+    surface.check_size(count)
     probe = surface.probe(dragged)
     easy = vector("ease", 1.0 if ease is None else ease, len(raw))
     unknowns = _unknowns(len(raw), partners, easy)

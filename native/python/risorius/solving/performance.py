@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base import signatures
+from ..base.budget import BudgetError
 from ..base.errors import RisoriusError
-from ..base.npz import DAMAGED
+from ..base.npz import DAMAGED, hold_arrays
 from .surface import Doubles, Floats
 
 _SCALES = 10.0 ** np.arange(-3, 4)
@@ -76,8 +77,11 @@ def read_performance(
 def _arrays(path: str | os.PathLike[str]) -> Performance:
     with open(path, "rb") as opened:
         try:
+            hold_arrays(opened)
             with np.load(opened, allow_pickle=False) as file:
                 values = {name: file[name] for name in file.files}
+        except BudgetError as error:
+            raise PerformanceError(f"{path}: {error}") from error
         except DAMAGED as error:
             raise PerformanceError(f"{path}: an .npz file was expected: {error}") from error
     frames = values.get("vertices")

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._native import Dna, Probe, Rig, Skins
+from ..base.budget import Budget
 from ..base.errors import ArgumentError
 from ..base.given import LARGEST, MOST, shown
 
@@ -49,8 +50,12 @@ class Surface:
         _below("lod: a LOD", lod, max(1, rig.lod_count))
         self._skins = Skins(dna, rig, lod)
         self.rig, self.lod = rig, lod
-        self.mesh_indices = [int(m) for m in dna.lod_mesh_mapping[lod]]
         self.vertex_counts = [len(mesh.positions) for mesh in dna.meshes]
+        mapping = dna.lod_mesh_mapping
+        listed = mapping[lod].tolist() if lod < len(mapping) else []
+        # A file may name meshes and not hold them.
+        self.mesh_indices = [m for m in listed if m < len(self.vertex_counts)]
+        self._size = dna.size_in_bytes()
         self.mm = MM.get(dna.translation_unit, 10.0)
         self._moved: Doubles | None = None
         self._look_at_axes(dna.coordinate_system)
@@ -106,7 +111,9 @@ class Surface:
         """
         at = self.controls(raw)
         _, high = limits(len(at), lowest, highest)
-        probe = self.probe(self._points(mesh, vertices))
+        points = self._points(mesh, vertices)
+        self.check_size(len(points))
+        probe = self.probe(points)
         probe.linearise(at, high, np.ones(len(at), bool))
         return probe.jacobian()
 
@@ -130,6 +137,7 @@ class Surface:
             rows = [
                 (m, v) for m in self.mesh_indices for v in range(0, self.vertex_counts[m], every)
             ]
+            self.check_size(len(rows))
             probe = self.probe(np.asarray(rows, np.int64).reshape(len(rows), 2))
             probe.linearise(np.zeros(count), np.ones(count), np.ones(count, bool))
             self._moved = np.linalg.norm(probe.jacobian(), axis=1).astype(np.float64)
@@ -153,6 +161,19 @@ class Surface:
             _below(f"points[{at}]: a mesh", int(mesh[at]), len(self.vertex_counts))
             _below(f"points[{at}]: a vertex", int(vertex[at]), self.vertex_counts[mesh[at]])
         return Probe(self._skins, points.astype(np.uint32))
+
+    def check_size(self, points: int) -> None:
+        """Before derivatives of some points by all controls are held, and their products.
+
+        Args:
+            points: how many.
+
+        Raises:
+            BudgetError: that is far more than the face, as of one with very many raw controls.
+        """
+        count = self.control_count
+        place = f"what {count:,} raw controls do to {points:,} points"
+        Budget.of(self._size).hold(12 * points * count + 8 * count**2, place)
 
     def controls(self, raw: npt.ArrayLike) -> Floats:
         """float32[R] of what a caller gave.

@@ -38,7 +38,8 @@ def add_correctives(dna: Dna, skin: int, correctives: Sequence[Row]) -> Dna:
         ArgumentError: a face with inputs behind its correctives, as networks have.
     """
     raw, had = len(dna.raw_control_names), dna.psd_count
-    if sk.column_count(dna) > raw + had or len(dna.machine_learned_behavior.neural_networks):
+    others = len(dna.machine_learned_behavior.neural_networks) + len(dna.rbf_behavior.solvers)
+    if sk.column_count(dna) > raw + had or others:
         raise ArgumentError("a face without networks and solvers was expected")
     channel_of = _channels(dna)
     new = [row for row in correctives if frozenset(row[0]) not in channel_of]

@@ -89,7 +89,8 @@ def column_count(dna: Dna) -> int:
     """How many inputs joint groups and blend shape channels have."""
     lists = [g.input_indices for g in dna.joint_groups] + [dna.blend_shape_channels.input_indices]
     most = max((int(values.max()) + 1 for values in lists if len(values)), default=0)
-    return max(most, dna.joint_column_count, len(dna.raw_control_names))
+    # What the file states as the width of its matrix is no measure: nothing holds it to anything.
+    return max(most, len(dna.raw_control_names))
 
 
 def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
@@ -103,16 +104,13 @@ def psd_parts(dna: Dna) -> dict[int, frozenset[int]]:
 
 def joint_levels(dna: Dna) -> list[Ints]:
     """Joint indices by their depth in the tree: roots first, each level hangs on the one before."""
-    parents = np.asarray(dna.joint_parents, np.int64)
-    depth, at = np.zeros_like(parents), np.arange(len(parents))
-    for _ in range(len(parents)):
-        above = parents[at]
-        deeper = above != at
-        if not deeper.any():
-            break
-        depth += deeper
-        at = above
-    return [np.flatnonzero(depth == level) for level in range(int(depth.max(initial=-1)) + 1)]
+    at = np.asarray(dna.joint_parents, np.int64)
+    depth = (at != np.arange(len(at))).astype(np.int64)
+    for _ in range(len(at).bit_length()):  # a step to the parent, then two at once, then four
+        depth += depth[at]
+        at = at[at]
+    order = np.argsort(depth, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(depth))[:-1]) if len(at) else []
 
 
 def parent_order(dna: Dna) -> list[int]:
@@ -132,7 +130,7 @@ def column_deltas(dna: Dna, columns: int) -> Doubles:
         values = np.asarray(group.values, np.float64)
         inputs = np.asarray(group.input_indices, np.int64)
         out[inputs[:, None], np.asarray(group.output_indices, np.int64)[None]] += values.T
-    return out.reshape(columns, -1, 9)
+    return out.reshape(columns, len(dna.joint_names), 9)
 
 
 def world_matrices(dna: Dna, deltas: Doubles) -> Doubles:
@@ -170,6 +168,24 @@ def column_motions(dna: Dna, columns: int, value: float = 1.0) -> Doubles:
     return (posed @ np.linalg.inv(rest))[..., :3, :]
 
 
+def skin_entries(mesh: Mesh) -> tuple[Ints, Ints, Doubles]:
+    """Vertex, joint and weight of each entry of a mesh' skin, by vertex; weights of a vertex have
+    sum 1.
+
+    Args:
+        mesh: has the weights.
+    """
+    count, offsets = len(mesh.positions), np.asarray(mesh.skin_offsets, np.int64)
+    vertex = np.repeat(np.arange(len(offsets) - 1 if len(offsets) else 0), np.diff(offsets))
+    weight = np.asarray(mesh.skin_weights, np.float64)
+    total = np.bincount(vertex, weights=weight, minlength=count)
+    return (
+        vertex,
+        np.asarray(mesh.skin_joint_indices, np.int64),
+        weight / np.where(total > 0, total, 1)[vertex],
+    )
+
+
 def dense_weights(mesh: Mesh, joints: int) -> Doubles:
     """float64[V, joints] of a mesh' skin weights, rows with sum 1.
 
@@ -177,13 +193,10 @@ def dense_weights(mesh: Mesh, joints: int) -> Doubles:
         mesh: has the weights.
         joints: how many joints there are.
     """
-    count = len(mesh.positions)
-    offsets = np.asarray(mesh.skin_offsets, np.int64)
-    vertex = np.repeat(np.arange(count), np.diff(offsets))
-    out = np.zeros((count, joints))
-    np.add.at(out, (vertex, np.asarray(mesh.skin_joint_indices, np.int64)), mesh.skin_weights)
-    total = out.sum(axis=1, keepdims=True)
-    return out / np.where(total > 0, total, 1)
+    vertex, joint, weight = skin_entries(mesh)
+    out = np.zeros((len(mesh.positions), joints))
+    np.add.at(out, (vertex, joint), weight)
+    return out
 
 
 def column_shapes(dna: Dna, mesh: Mesh, columns: int) -> dict[int, Doubles]:
@@ -288,7 +301,8 @@ def mesh_edges(mesh: Mesh) -> npt.NDArray[np.uint32]:
     corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     offsets = np.asarray(mesh.face_offsets, np.int64)
     following = np.arange(1, len(corners) + 1)
-    following[offsets[1:] - 1] = offsets[:-1]
+    full = offsets[1:] > offsets[:-1]  # faces without corners have no edges
+    following[offsets[1:][full] - 1] = offsets[:-1][full]
     pairs = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     return np.unique(pairs, axis=0).astype(np.uint32)

@@ -11,7 +11,7 @@ import risorius
 from ...base.given import GivenError, finite_text
 from ...files import fileio
 from ...mixing import REGIONS, Masks, Mix, check_compatible, mix_faces
-from ...mixing.textures import check_room, mix_textures, texture_folder
+from ...mixing.textures import WHY, check_room, mix_textures, texture_folder
 from ..files import CommandLineError, read, refuse_same_file, require_suffix, summary
 
 _DESCRIPTION = """\
@@ -77,12 +77,14 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _say(out: Path, dna: risorius.Dna, files: list[str], mix: Mix, own: list[str]) -> None:
+def _say(out: Path, dna: risorius.Dna, files: list[str], mix: Mix, own: dict[str, str]) -> None:
     whole = zip(files, mix.whole(), strict=True)
     parts = [f"{Path(file).stem} {share:.0%}" for file, share in whole if share]
     print(f"{out}: {summary(dna)}: {', '.join(parts)}")
     for region, shares in mix.regions.items():
         named = ", ".join(f"{Path(files[p]).stem} {share:.0%}" for p, share in shares.items())
         print(f"  {region}: {named}")
-    if own:
-        print(f"  not mixed, as another program wrote them: {', '.join(own)}")
+    leading = Path(files[int(mix.whole().argmax())]).stem
+    for why, text in WHY.items():
+        if names := ", ".join(name for name, found in own.items() if found == why):
+            print(f"  pictures of {leading}, as {text}: {names}")

@@ -84,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
         last = max(1, rig.lod_count) - 1
         raise CommandLineError(f"--lod: 0 to {last} was expected, found {args.lod}")
     surface = risorius.Surface(dna, rig, args.lod)
+    if not surface.mesh_indices:
+        raise InputError(f"{args.face}: a face with meshes at LOD {args.lod} was expected")
     take = read_performance(args.performance, args.object, _counts(dna, surface, args))
     mesh = _mesh(dna, surface, args, take)
     take = fitted(take, dna.meshes[mesh].positions)
@@ -112,7 +114,7 @@ def _counts(
     """Vertices of the meshes that are meant, by mesh. Raises: CommandLineError."""
     if args.mesh is None:
         return {m: surface.vertex_counts[m] for m in surface.mesh_indices}
-    names = list(dna.mesh_names)
+    names = list(dna.mesh_names)[: len(surface.vertex_counts)]
     if args.mesh not in names:
         raise CommandLineError(f"--mesh: one of {', '.join(names)} was expected, found {args.mesh}")
     mesh = names.index(args.mesh)

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""What controls do to joints in a mix: the mean of each row of the joint matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import Dna, JointGroup
+from ..author.geometry.skeleton import Doubles, Ints
+from .compatible import alike, turned_groups
+from .share import Share
+
+_DENSER = 4  # a group of several holds at most so many times their numbers
+Part = tuple[int, JointGroup]  # a parent's number, a group of its own
+
+
+def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
+    """The joint groups of a mix.
+
+    Groups of the same lists become one with these; otherwise those that share a joint become one
+    with the rows and columns of all, or several where that would hold far more numbers.
+
+    Args:
+        parents: compatible ones.
+        share: of the joints.
+    """
+    groups = [list(p.joint_groups) for p in parents]
+    if share.is_whole and all(alike(groups[0], own) for own in groups[1:]):
+        return groups[0]
+    lists = [[_lists(g) for g in own] for own in groups]
+    if all(own == lists[0] for own in lists[1:]):
+        return [_mean(row, share) for row in zip(*groups, strict=True)]
+    # Of joints that turn by quaternions the order of columns counts, which is the same in all.
+    turned = [turned_groups(p) for p in parents]
+    out = [
+        _mean([groups[p][g] for p, g in enumerate(row)], share) for row in zip(*turned, strict=True)
+    ]
+    others = [
+        (p, group)
+        for p, own in enumerate(groups)
+        for g, group in enumerate(own)
+        if g not in set(turned[p])
+    ]
+    for parts in _together(others):
+        out += _joined(parts, share, max(1, parents[0].lod_count))
+    return out
+
+
+def _lists(group: JointGroup) -> tuple[bytes, ...]:
+    fields = (group.lods, group.input_indices, group.output_indices)
+    return tuple(field.tobytes() for field in fields)
+
+
+def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
+    """A group of those of the parents, which have the same rows and columns."""
+    first = groups[0]
+    rows = np.asarray(first.output_indices, np.int64)
+    values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))
+    return JointGroup(
+        lods=first.lods,
+        input_indices=first.input_indices,
+        output_indices=first.output_indices,
+        values=np.asarray(values, np.float32).reshape(first.values.shape),
+        joint_indices=first.joint_indices,
+    )
+
+
+def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
+    """float64[n] of rows of a parent: places have its size, turns and sizes do not."""
+    joints = rows // 9
+    return np.where(rows % 9 < 3, share.scaled[joints, parent], share.weights[joints, parent])
+
+
+def _together(parts: Sequence[Part]) -> list[list[Part]]:
+    """The groups that share joints, directly or by others; in the order of their first joints."""
+    above: dict[int, int] = {}  # joint -> one that it goes with
+
+    def root(joint: int) -> int:
+        while above[joint] != joint:
+            above[joint] = above[above[joint]]
+            joint = above[joint]
+        return joint
+
+    joints = [_joints(group) for _, group in parts]
+    for own in joints:
+        for joint in own:
+            above.setdefault(joint, joint)
+            one, other = sorted((root(joint), root(own[0])))
+            above[other] = one
+    found: dict[int, list[Part]] = {}
+    for part, own in zip(parts, joints, strict=True):
+        if own:
+            found.setdefault(root(own[0]), []).append(part)
+    return [found[first] for first in sorted(found)]
+
+
+def _joints(group: JointGroup) -> list[int]:
+    rows = np.asarray(group.output_indices, np.int64) // 9
+    return [int(j) for j in np.union1d(rows, np.asarray(group.joint_indices, np.int64))]
+
+
+def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
+    """One group of several, or some of which each has rows that the same parts have."""
+    levels_of: dict[int, int] = {}  # row -> how many levels have it
+    of_row: dict[int, list[int]] = {}  # row -> numbers of the parts that have it
+    used: list[_Source] = []
+    for p, group in parts:
+        rows = np.asarray(group.output_indices, np.int64)
+        if not (share.weights[rows // 9, p] > 0).any():
+            continue
+        lods = [int(group.lods[lod]) for lod in range(min(levels, len(group.lods)))]
+        place = {row: at for at, row in enumerate(rows.tolist())}
+        for row, at in place.items():
+            levels_of[row] = max(levels_of.get(row, 0), sum(at < n for n in lods))
+            of_row.setdefault(row, []).append(len(used))
+        used.append(_Source(p, group, place))
+    cells = sum(source.group.values.size for source in used)
+    columns = {int(c) for source in used for c in source.group.input_indices}
+    if len(of_row) * len(columns) <= _DENSER * cells:
+        whole = _block(list(of_row), used, share, levels_of, levels)
+        for group in whole:
+            group.joint_indices = sorted({j for source in used for j in _joints(source.group)})
+        return whole
+    blocks: dict[tuple[int, ...], list[int]] = {}
+    for row, numbers in of_row.items():
+        blocks.setdefault(tuple(numbers), []).append(row)
+    return [
+        group
+        for numbers, rows in blocks.items()
+        for group in _block(rows, [used[n] for n in numbers], share, levels_of, levels)
+    ]
+
+
+class _Source(NamedTuple):
+    parent: int
+    group: JointGroup
+    place: dict[int, int]  # of its rows
+
+
+def _block(
+    rows: list[int],
+    sources: Sequence[_Source],
+    share: Share,
+    levels_of: dict[int, int],
+    levels: int,
+) -> list[JointGroup]:
+    """The group of some rows, with all columns that the sources have; none without columns."""
+    order = sorted(rows, key=lambda row: -levels_of[row])
+    inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
+    if not order or not inputs:
+        return []
+    values = np.zeros((len(order), len(inputs)))
+    for source in sources:
+        here = [(at, row) for at, row in enumerate(order) if row in source.place]
+        at = np.array([at for at, _ in here], np.int64)
+        own = np.array([source.place[row] for _, row in here], np.int64)
+        part = _weights(share, source.parent, np.array([row for _, row in here], np.int64))
+        columns = np.searchsorted(inputs, source.group.input_indices)
+        values[at[:, None], columns] += part[:, None] * source.group.values[own]
+    counts = np.array([levels_of[row] for row in order])
+    return [
+        JointGroup(
+            lods=[int((counts > lod).sum()) for lod in range(levels)],
+            input_indices=inputs,
+            output_indices=order,
+            values=values.astype(np.float32),
+            joint_indices=sorted({row // 9 for row in order}),
+        )
+    ]

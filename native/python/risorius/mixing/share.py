@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""What points have of each parent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..author.geometry.skeleton import Doubles
+
+
+@dataclass
+class Share:
+    """What points have of each parent.
+
+    Attributes:
+        weights: float64[n, P], rows sum to 1.
+        scaled: float64[n, P], the same times the size that each parent's lengths get.
+        shift: float64[n, 3], what is added to places.
+    """
+
+    weights: Doubles
+    scaled: Doubles
+    shift: Doubles
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether nothing is brought to another size or place."""
+        return self.scaled is self.weights
+
+    def places(self, points: Sequence[object]) -> Doubles:
+        """float64[n, 3] of the parents' points.
+
+        Args:
+            points: float64[n, 3] of each parent.
+        """
+        if self.is_whole:
+            return mean_of(points, self.weights)
+        return _sum_of([np.asarray(p, np.float64) for p in points], self.scaled) + self.shift
+
+
+def mean_of(values: Sequence[object], weights: Doubles) -> Doubles:
+    """float64[n, ...]: the mean of arrays of the same shape; where all are the same, these.
+
+    Args:
+        values: float64[n, ...] of each parent.
+        weights: float64[n, P] of the rows, which sum to 1.
+    """
+    rows = [np.asarray(v, np.float64) for v in values]
+    if all(np.array_equal(rows[0], row) for row in rows[1:]):
+        return rows[0].copy()
+    return _sum_of(rows, weights)
+
+
+def _sum_of(rows: Sequence[Doubles], weights: Doubles) -> Doubles:
+    shape = (-1, *[1] * (rows[0].ndim - 1))
+    return np.asarray(sum(weights[:, p].reshape(shape) * row for p, row in enumerate(rows)))
