@@ -224,33 +224,6 @@ def test_faces_are_imported_side_by_side(dna_file):
     assert tuple(scene.controls(scene.load(dna_file, "LIVE")).location) == (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("what", ["scale", "all"])
-def test_applying_the_transform_of_the_controls_keeps_size_and_place(what, dna_file):
-    rig = scene.load(dna_file, "LIVE")
-    controls = scene.controls(rig)
-    hat = bpy.data.objects.new("Hat", None)
-    bpy.context.scene.collection.objects.link(hat)
-    hat.parent, hat.location = controls, (0.0, 0.1, 0.2)
-    controls.scale = (2.0, 2.0, 2.0)
-    if what == "all":
-        controls.location, controls.rotation_euler = (0.3, -0.2, 0.1), (0.2, 0.0, 0.5)
-    scene.set_controls(rig, jawOpen=0.5)
-    matrix, bones = controls.matrix_basis.copy(), _rests(controls)
-    points, hat_at = scene.snapshot(rig), hat.matrix_world.copy()
-    for item in bpy.context.view_layer.objects:
-        item.select_set(item == controls)
-    applied = {"location": what == "all", "rotation": what == "all", "scale": True}
-    assert bpy.ops.object.transform_apply(**applied) == {"FINISHED"}
-    bpy.context.view_layer.update()
-    bpy.context.view_layer.update()
-    np.testing.assert_allclose(scene.snapshot(rig), points, atol=1e-5)
-    np.testing.assert_allclose(controls.matrix_basis, matrix, atol=1e-6)
-    np.testing.assert_allclose(_rests(controls), bones, atol=1e-6)
-    np.testing.assert_allclose(hat.matrix_world, hat_at, atol=1e-5)
-    raw = scene.raw_of(rig, dna_file)
-    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
-
-
 def _rests(controls):
     return np.array([bone.matrix_local for bone in controls.data.bones])
 

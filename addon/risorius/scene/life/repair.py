@@ -16,11 +16,10 @@ from ...logic.character import plans
 from ..base import console, parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, build, meshes, runtime
-from . import applied_transforms
 
 
 def heal(rig: ArmatureObject) -> list[str]:
-    """Give control bones and sliders of a character their names back, and their place.
+    """Give control bones and sliders of a character their names back.
 
     Args:
         rig: its deforming armature, of this file.
@@ -32,7 +31,7 @@ def heal(rig: ArmatureObject) -> list[str]:
     if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":
         return []
     held = cast("ArmatureObject", controls)
-    return [*_bone_names(held), *_sliders(rig), *applied_transforms.take_back(held)]
+    return [*_bone_names(held), *_sliders(rig)]
 
 
 def heal_all() -> list[ArmatureObject]:
