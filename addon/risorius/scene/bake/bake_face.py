@@ -210,7 +210,7 @@ def _write_result(
         "by_distance": int(lods.by_distance(rig)),
     }
     tracks = baked_tracks.rig_tracks(rig, live, samples, pose, options.wanted)
-    _play(rig, f"{name}_baked", samples.frames, tracks, options, counts)
+    _play(rig, f"{name}_baked", samples.times, tracks, options, counts)
     if "SHAPES" in options.wanted:
         for item in shown(rig, level):
             _write_keys(item, live, samples, pose.blend_shapes, options, counts)
@@ -236,7 +236,7 @@ def _write_keys(
     names = baked_shape_keys.opened(item, live, used)
     tracks = baked_tracks.key_tracks(key, names, weights, samples.others.get(key))
     if tracks:
-        _play(key, f"{item.name}_baked", samples.frames, tracks, options, counts)
+        _play(key, f"{item.name}_baked", samples.times, tracks, options, counts)
 
 
 def _play(
@@ -257,7 +257,7 @@ def _write_controls(
     controls, counts = parts.controls_there(rig), actions.Counts()
     tracks = baked_tracks.control_tracks(controls, runtime.there(rig), samples)
     name = rig.name.removesuffix("_rig")
-    _play(controls, f"{name}_controls_baked", samples.frames, tracks, options, counts)
+    _play(controls, f"{name}_controls_baked", samples.times, tracks, options, counts)
     actions.note_values(controls, [t.path for t in tracks])
     held = []
     for bone_name in samples.basis:
