@@ -15,7 +15,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 from numpy.typing import NDArray
 
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import ArmatureObject, Depsgraph
 
 CONSTRAINT = "Risorius Body"
@@ -204,7 +204,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
     turns = {}
     for own, key in (("neck", parts.BODY_NECK), ("head", parts.BODY_HEAD)):
         total = Quaternion()
-        for name in controls.get(key, "").split("\n"):
+        for name in saved.text(controls, key).split("\n"):
             bone = seen.pose.bones.get(name)
             if bone is not None:
                 total = total @ own_turn(seen, bone)
