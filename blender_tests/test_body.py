@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Quaternion, Vector
 from support import pictures, scene
+from support.layout import drawn
 
 NAMES = {
     "unreal": ("spine_05", "neck_01", "neck_02", "head"),
@@ -255,3 +256,25 @@ def test_a_face_is_made_as_large_as_the_body_it_is_put_on(dna_file):
             head, heads = here, there
         else:
             assert (here - head).length == pytest.approx((there - heads).length, rel=1e-4)
+
+
+def test_the_panel_says_that_keys_on_joints_lead_and_that_a_parent_shears(dna_file):
+    rig = scene.load(dna_file, "LIVE")
+    controls = scene.controls(rig)
+    assert "lead" not in drawn(bpy.types.RISORIUS_PT_character).text()
+    rig.pose.bones["user_joint"].keyframe_insert("location", frame=1)
+    assert "lead" not in drawn(bpy.types.RISORIUS_PT_character).text()
+    rig.pose.bones["FACIAL_C_Jaw"].keyframe_insert("location", frame=1)
+    shown = drawn(bpy.types.RISORIUS_PT_character).text()
+    assert "Keys on joints of Small_rig lead" in shown
+    assert "shears" not in shown
+    rig.animation_data.action = None
+    parents = [bpy.data.objects.new(name, None) for name in ("Long", "Turned")]
+    for item in parents:
+        bpy.context.scene.collection.objects.link(item)
+    parents[0].scale, parents[1].rotation_euler = (1.0, 2.0, 0.5), (0.6, 0.4, 0.7)
+    parents[1].parent, controls.parent = parents[0], parents[1]
+    scene.update(controls)
+    shown = drawn(bpy.types.RISORIUS_PT_character).text()
+    assert "The parent of Small_controls shears it" in shown
+    assert "lead" not in shown
