@@ -83,6 +83,17 @@ def test_a_baked_face_moves_as_the_live_one(mode, dna_file):
     assert np.abs(wanted[0][0] - wanted[3][0]).max() > 1e-3  # it does move
 
 
+@pytest.mark.parametrize("options", [{}, {"kind": "CONTROLS", "strip": True}, {"strip": True}])
+def test_a_face_baked_under_time_stretching_moves_as_the_live_one(options, dna_file):
+    rig = _face(dna_file, "KEYS")
+    render = bpy.context.scene.render
+    render.frame_map_old, render.frame_map_new = (100, 70) if options else (30, 100)
+    wanted = _film(rig)
+    _bake(**options)
+    _assert_same(_film(rig), wanted)
+    assert np.abs(wanted[0][0] - wanted[-1][0]).max() > 1e-3  # it does move
+
+
 def test_it_plays_without_the_add_on_and_controls_move_it_no_more(mode, dna_file):
     rig = _face(dna_file, mode)
     wanted = _film(rig)

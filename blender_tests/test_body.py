@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix, Quaternion, Vector
 from support import pictures, scene
+from support.layout import drawn
 
 NAMES = {
     "unreal": ("spine_05", "neck_01", "neck_02", "head"),
@@ -224,33 +225,6 @@ def test_faces_are_imported_side_by_side(dna_file):
     assert tuple(scene.controls(scene.load(dna_file, "LIVE")).location) == (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("what", ["scale", "all"])
-def test_applying_the_transform_of_the_controls_keeps_size_and_place(what, dna_file):
-    rig = scene.load(dna_file, "LIVE")
-    controls = scene.controls(rig)
-    hat = bpy.data.objects.new("Hat", None)
-    bpy.context.scene.collection.objects.link(hat)
-    hat.parent, hat.location = controls, (0.0, 0.1, 0.2)
-    controls.scale = (2.0, 2.0, 2.0)
-    if what == "all":
-        controls.location, controls.rotation_euler = (0.3, -0.2, 0.1), (0.2, 0.0, 0.5)
-    scene.set_controls(rig, jawOpen=0.5)
-    matrix, bones = controls.matrix_basis.copy(), _rests(controls)
-    points, hat_at = scene.snapshot(rig), hat.matrix_world.copy()
-    for item in bpy.context.view_layer.objects:
-        item.select_set(item == controls)
-    applied = {"location": what == "all", "rotation": what == "all", "scale": True}
-    assert bpy.ops.object.transform_apply(**applied) == {"FINISHED"}
-    bpy.context.view_layer.update()
-    bpy.context.view_layer.update()
-    np.testing.assert_allclose(scene.snapshot(rig), points, atol=1e-5)
-    np.testing.assert_allclose(controls.matrix_basis, matrix, atol=1e-6)
-    np.testing.assert_allclose(_rests(controls), bones, atol=1e-6)
-    np.testing.assert_allclose(hat.matrix_world, hat_at, atol=1e-5)
-    raw = scene.raw_of(rig, dna_file)
-    assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
-
-
 def _rests(controls):
     return np.array([bone.matrix_local for bone in controls.data.bones])
 
@@ -282,3 +256,25 @@ def test_a_face_is_made_as_large_as_the_body_it_is_put_on(dna_file):
             head, heads = here, there
         else:
             assert (here - head).length == pytest.approx((there - heads).length, rel=1e-4)
+
+
+def test_the_panel_says_that_keys_on_joints_lead_and_that_a_parent_shears(dna_file):
+    rig = scene.load(dna_file, "LIVE")
+    controls = scene.controls(rig)
+    assert "lead" not in drawn(bpy.types.RISORIUS_PT_character).text()
+    rig.pose.bones["user_joint"].keyframe_insert("location", frame=1)
+    assert "lead" not in drawn(bpy.types.RISORIUS_PT_character).text()
+    rig.pose.bones["FACIAL_C_Jaw"].keyframe_insert("location", frame=1)
+    shown = drawn(bpy.types.RISORIUS_PT_character).text()
+    assert "Keys on joints of Small_rig lead" in shown
+    assert "shears" not in shown
+    rig.animation_data.action = None
+    parents = [bpy.data.objects.new(name, None) for name in ("Long", "Turned")]
+    for item in parents:
+        bpy.context.scene.collection.objects.link(item)
+    parents[0].scale, parents[1].rotation_euler = (1.0, 2.0, 0.5), (0.6, 0.4, 0.7)
+    parents[1].parent, controls.parent = parents[0], parents[1]
+    scene.update(controls)
+    shown = drawn(bpy.types.RISORIUS_PT_character).text()
+    assert "The parent of Small_controls shears it" in shown
+    assert "lead" not in shown

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...logic.animation import key_reduction as reduction
 from ...logic.animation import track_matching
-from ..base import compat
+from ..base import compat, saved
 from ..base.blender_types import Animated
 
 BEFORE = "risorius_before"  # on what plays a baked action: what animated it before
@@ -272,16 +272,16 @@ def note_values(owner: Animated, paths: Iterable[str]) -> None:
 
 def _set_back(owner: Animated, lines: Iterable[str]) -> None:
     for line in lines:
-        path, numbers = json.loads(line)
         try:
+            path, numbers = json.loads(line)
             value = owner.path_resolve(path)
-        except ValueError:
-            continue  # it is gone
-        if isinstance(value, (bool, int, float)):
-            _set(owner, path, numbers[0])
-        else:
-            for i, number in enumerate(numbers):
-                value[i] = number
+            if isinstance(value, (bool, int, float)):
+                _set(owner, path, numbers[0])
+            else:
+                for i, number in enumerate(numbers):
+                    value[i] = number
+        except (ValueError, TypeError, LookupError, AttributeError):
+            continue  # it is gone, or was never of ours
 
 
 def _set(owner: Animated, path: str, number: float) -> None:
@@ -301,29 +301,24 @@ def restore(owner: Animated) -> None:
     What was baked goes, unless somebody else uses it, or the user protected or edited it; an action
     that the user gave it meanwhile stays in the file.
     """
-    state = owner.get(BEFORE)
-    if state is None:
+    if BEFORE not in owner:
         return
+    note_tracks_by_name(owner)
+    state = saved.table(owner, BEFORE) or {}
     data = owner.animation_data or owner.animation_data_create()
     baked = [data.action]
-    if data.action is not None and data.action != state.get("action"):
+    action = state.get("action")
+    action = action if isinstance(action, bpy.types.Action) else None
+    if data.action is not None and data.action != action:
         data.action.use_fake_user |= not data.action.get(BAKED_ACTION)
     if "track" in state:
-        baked += _remove_track(owner, state)
+        baked += _remove_track(data, state)
     for curve in data.drivers:
-        if f"{curve.array_index} {curve.data_path}" in list(state.get("drivers", ())):
+        if f"{curve.array_index} {curve.data_path}" in saved.texts(state, "drivers"):
             curve.mute = False
-    action = state.get("action")
-    data.action = action
-    if action is not None and "slot" in state:
-        slot = next((s for s in action.slots if s.identifier == state["slot"]), None)
-        if slot is not None:
-            data.action_slot = slot
-    data.action_influence, data.action_blend_type = state["influence"], state["blend"]
-    data.action_extrapolation = state["extrapolation"]
-    data.use_nla = bool(state["use_nla"])
-    _set_back(owner, list(state.get("values", ())))
-    if not state["had"] and not (action or data.drivers or data.nla_tracks):
+    _play_again(data, state, action)
+    _set_back(owner, saved.texts(state, "values"))
+    if not saved.whole(state, "had", 1) and not (action or data.drivers or data.nla_tracks):
         owner.animation_data_clear()
     del owner[BEFORE]
     for made in baked:
@@ -333,6 +328,23 @@ def restore(owner: Animated) -> None:
             bpy.data.actions.remove(made)
         else:
             made.use_fake_user = True
+
+
+def _play_again(
+    data: bpy.types.AnimData, state: Mapping[str, object], action: bpy.types.Action | None
+) -> None:
+    """Give animation data the action and the settings that it had."""
+    data.action = action
+    if action is not None and "slot" in state:
+        slot = next((s for s in action.slots if s.identifier == state["slot"]), None)
+        if slot is not None:
+            data.action_slot = slot
+    data.action_influence = saved.number(state, "influence", 1.0, 0.0, 1.0)
+    for name, key in (("action_blend_type", "blend"), ("action_extrapolation", "extrapolation")):
+        known = data.bl_rna.properties[name]
+        if saved.text(state, key) in cast("bpy.types.EnumProperty", known).enum_items:
+            setattr(data, name, state[key])
+    data.use_nla = bool(saved.whole(state, "use_nla", 1))
 
 
 def _is_used(action: bpy.types.Action) -> bool:
@@ -347,42 +359,53 @@ def _noted(track: bpy.types.NlaTrack, mute: bool | int, solo: bool | int) -> str
     return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
 
 
+def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
+    """What `_noted` wrote, or None where somebody else wrote something."""
+    try:
+        mute, solo, name, strips = json.loads(line)
+        return bool(mute), bool(solo), str(name), [str(strip) for strip in strips]
+    except (ValueError, TypeError):
+        return None
+
+
 def note_tracks_by_name(owner: Animated) -> bool:
     """Write what is kept of tracks in the present way: up to form 0 it was by their order.
 
     Returns:
         Whether there was anything to write.
     """
-    state = owner.get(BEFORE)
-    lines = list(state.get("tracks", ())) if state is not None else []
-    if state is None or not lines or lines[0].startswith("["):
+    state = saved.table(owner, BEFORE) or {}
+    lines = saved.texts(state, "tracks")
+    if not lines or lines[0].startswith("["):
         return False
     data = owner.animation_data
     if data is None:  # somebody took it away, and the tracks with it
-        state["tracks"] = []
+        owner[BEFORE]["tracks"] = []
         return False
-    own = data.nla_tracks.get(state["track"])
+    own = data.nla_tracks.get(saved.text(state, "track"))
     others = [track for track in data.nla_tracks if track != own]
-    pairs = [(t, *(int(w) for w in x.split())) for t, x in zip(others, lines, strict=False)]
-    state["tracks"] = [_noted(*pair) for pair in pairs]
+    flags = [[*x.split(), "0", "0"][:2] for x in lines]
+    pairs = zip(others, flags, strict=False)
+    owner[BEFORE]["tracks"] = [_noted(t, mute == "1", solo == "1") for t, (mute, solo) in pairs]
     if own is not None and len(own.strips) and own.strips[0].action is not None:
-        state["baked"] = own.strips[0].action
+        owner[BEFORE]["baked"] = own.strips[0].action
     return True
 
 
-def _remove_track(owner: Animated, state: bpy.types.bpy_struct) -> list[bpy.types.Action]:
+def _remove_track(
+    data: bpy.types.AnimData, state: Mapping[str, object]
+) -> list[bpy.types.Action | None]:
     """Take the baked strip away and give the other tracks their flags. Returns: its actions."""
-    note_tracks_by_name(owner)
-    data = owner.animation_data
-    assert data is not None
     own = _baked_strips(data, state)
-    played = [action for _track, strip in own for action in compat.actions_in([strip])]
+    played: list[bpy.types.Action | None] = []
+    for _track, strip in own:
+        played += compat.actions_in([strip])
     for track, strip in own:
         track.strips.remove(strip)
     for track in {track.name: track for track, _strip in own}.values():
         if not len(track.strips):
             data.nla_tracks.remove(track)
-    noted = [json.loads(line) for line in state.get("tracks", ())]
+    noted = list(filter(None, map(_track_noted, saved.texts(state, "tracks"))))
     there = [(track.name, [s.name for s in track.strips]) for track in data.nla_tracks]
     pairs = track_matching.matched([(name, strips) for _mute, _solo, name, strips in noted], there)
     for at, before in pairs.items():
@@ -394,7 +417,7 @@ def _remove_track(owner: Animated, state: bpy.types.bpy_struct) -> list[bpy.type
 
 
 def _baked_strips(
-    data: bpy.types.AnimData, state: bpy.types.bpy_struct
+    data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
     """Track and strip of what `play` put there, also where it was renamed or moved."""
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
@@ -404,7 +427,7 @@ def _baked_strips(
         return own
     # A copy of the object may play a copy of the action.
     marked = [(t, s) for t, s in strips if s.action is not None and s.action.get(BAKED_ACTION)]
-    return [(t, s) for t, s in marked if t.name == state["track"]]
+    return [(t, s) for t, s in marked if t.name == saved.text(state, "track")]
 
 
 def busy(owner: Animated) -> str:

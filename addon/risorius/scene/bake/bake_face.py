@@ -8,7 +8,7 @@ on the part itself, in the file.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from ...logic.animation import key_reduction
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..animation import actions
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import Animated, ArmatureObject, Context, MeshObject
 from ..character import lods, runtime
 from ..frame import channel_preview, controls_ahead, evaluate
@@ -68,13 +68,21 @@ def words(rig: ArmatureObject) -> str:
     kind = baked(rig)
     if not kind:
         return ""
-    state = (rig if kind == RESULT else parts.controls_there(rig))[parts.BAKED]
+    state = _kept(rig if kind == RESULT else parts.controls_there(rig))
     what = told("Baked: it plays its actions")
     if kind == CONTROLS:
         what = told("The controls are baked; layers, NLA and drivers rest")
     return told(
-        "{what}, frames {start:g} to {end:g}.", what=what, start=state["start"], end=state["end"]
+        "{what}, frames {start:g} to {end:g}.",
+        what=what,
+        start=saved.number(state, "start", 0.0),
+        end=saved.number(state, "end", 0.0),
     )
+
+
+def _kept(owner: ArmatureObject) -> Mapping[str, object]:
+    """What a bake noted on an armature; empty where that is no table of ours."""
+    return saved.table(owner, parts.BAKED) or {}
 
 
 def refusal(rig: ArmatureObject, kind: str) -> str:
@@ -175,7 +183,7 @@ def shown(rig: ArmatureObject, level: int) -> list[MeshObject]:
         rig: deforming armature of the character.
         level: 0 is the finest.
     """
-    return [m for m in parts.meshes_of(rig) if level in list(m.get(parts.LODS, [level]))]
+    return [m for m in parts.meshes_of(rig) if lods.shows(m, level)]
 
 
 def animated_keys(rig: ArmatureObject, level: int) -> list[tuple[MeshObject, list[str]]]:
@@ -206,11 +214,11 @@ def _write_result(
     state = {
         "start": float(samples.frames[0]),
         "end": float(samples.frames[-1]),
-        "levels": [int(rig.get(k, -1)) for k in (parts.LOD, parts.LOD_RENDER)],
+        "levels": [saved.whole(rig, k, -1) for k in (parts.LOD, parts.LOD_RENDER)],
         "by_distance": int(lods.by_distance(rig)),
     }
     tracks = baked_tracks.rig_tracks(rig, live, samples, pose, options.wanted)
-    _play(rig, f"{name}_baked", samples.frames, tracks, options, counts)
+    _play(rig, f"{name}_baked", samples.times, tracks, options, counts)
     if "SHAPES" in options.wanted:
         for item in shown(rig, level):
             _write_keys(item, live, samples, pose.blend_shapes, options, counts)
@@ -236,7 +244,7 @@ def _write_keys(
     names = baked_shape_keys.opened(item, live, used)
     tracks = baked_tracks.key_tracks(key, names, weights, samples.others.get(key))
     if tracks:
-        _play(key, f"{item.name}_baked", samples.frames, tracks, options, counts)
+        _play(key, f"{item.name}_baked", samples.times, tracks, options, counts)
 
 
 def _play(
@@ -257,7 +265,7 @@ def _write_controls(
     controls, counts = parts.controls_there(rig), actions.Counts()
     tracks = baked_tracks.control_tracks(controls, runtime.there(rig), samples)
     name = rig.name.removesuffix("_rig")
-    _play(controls, f"{name}_controls_baked", samples.frames, tracks, options, counts)
+    _play(controls, f"{name}_controls_baked", samples.times, tracks, options, counts)
     actions.note_values(controls, [t.path for t in tracks])
     held = []
     for bone_name in samples.basis:
@@ -319,21 +327,21 @@ def _restore_animation(rig: ArmatureObject) -> None:
 
 
 def _restore_result(rig: ArmatureObject) -> None:
-    state = rig[parts.BAKED]
+    state = _kept(rig)
     _restore_animation(rig)
-    (viewport, render), by_distance = list(state["levels"]), bool(state["by_distance"])
+    levels = saved.wholes(state, "levels", lods.SAME, 255)
+    viewport, render = levels if len(levels) == 2 else (0, lods.SAME)
     del rig[parts.BAKED]
-    rig[parts.LOD], rig[parts.LOD_RENDER] = max(viewport, 0), render
-    rig[parts.LOD_BY_DISTANCE] = by_distance
-    lods.show(rig)
+    lods.follow_camera(rig, bool(saved.whole(state, "by_distance", 0)))
+    lods.show(rig, max(viewport, 0), render)
     rig.update_tag(refresh={"OBJECT", "TIME"})
 
 
 def _restore_controls(controls: ArmatureObject) -> None:
-    state = controls[parts.BAKED]
+    state = _kept(controls)
     actions.restore(controls)
-    for line in list(state[_CONSTRAINTS]):
-        bone_name, name = line.split("\n")
+    for line in saved.texts(state, _CONSTRAINTS):
+        bone_name, _end, name = line.partition("\n")
         bone = controls.pose.bones.get(bone_name)
         constraint = bone.constraints.get(name) if bone is not None else None
         if constraint is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..base import parts
+from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import build, meshes, runtime
 
@@ -23,9 +23,9 @@ def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict
     Returns:
         Channel -> key name; empty where the mesh has other vertices than its file.
     """
-    dna_mesh = live.dna.meshes[item[parts.MESH]]
+    dna_mesh = runtime.dna_mesh(live, item)
     key = item.data.shape_keys
-    if key is None or len(item.data.vertices) != len(dna_mesh.positions):
+    if dna_mesh is None or key is None or len(item.data.vertices) != len(dna_mesh.positions):
         return {}
     found = {channel: name for name, channel in meshes.real_channels(item).items()}
     block = meshes.live_block(item)
@@ -52,22 +52,23 @@ def close(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
         live: its Runtime.
     """
     key = item.data.shape_keys
-    if key is None or OPENED not in key:
+    dna_mesh = runtime.dna_mesh(live, item)
+    if dna_mesh is None or key is None or OPENED not in key:
         return
-    active, kept = item.active_shape_key, list(key.get(parts.REAL, ()))
+    active, kept = item.active_shape_key, saved.wholes(key, parts.REAL, 0)
     name = active.name if active is not None else ""
-    dna_mesh = live.dna.meshes[item[parts.MESH]]
     basis = meshes.imported_basis(dna_mesh, live.space)
     deltas = meshes.deltas_by_channel(dna_mesh, live.space.delta_matrix)
     same = len(item.data.vertices) == len(dna_mesh.positions)
-    for words in list(key[OPENED]):
-        channel, label = words.split(" ", 1)
+    for words in saved.texts(key, OPENED):
+        number, _space, label = words.partition(" ")
         block = key.key_blocks.get(label)
-        if block is None:
+        channel = int(number) if number.isdecimal() and len(number) < 6 else -1
+        if block is None or channel not in deltas:
             continue
-        if same and meshes.touched(key, block, basis, deltas[int(channel)]):
-            meshes.drive_key(key, block, rig, int(channel))
-            kept.append(int(channel))
+        if same and meshes.touched(key, block, basis, deltas[channel]):
+            meshes.drive_key(key, block, rig, channel)
+            kept.append(channel)
         else:
             item.shape_key_remove(block)
     if kept:

@@ -34,6 +34,7 @@ class Samples:
 
     Attributes:
         frames: float64[N].
+        times: float64[N] where actions are read at these frames: Time Stretching moves them apart.
         raw: float32[N, R] raw controls as the rig is evaluated with them.
         sliders: float32[N, R] the same before the eye bones add to the look controls; both with
             the layers.
@@ -46,6 +47,7 @@ class Samples:
     """
 
     frames: NDArray[np.float64]
+    times: NDArray[np.float64]
     raw: NDArray[np.float32]
     sliders: NDArray[np.float32]
     places: NDArray[np.float64]
@@ -78,6 +80,8 @@ def sample(
     readers = [
         _Reader(rig, frames, [k for k in keys if k[0].get(parts.RIG) == rig]) for rig in rigs
     ]
+    for reader in readers:
+        reader.samples.times = _times(context.scene, frames)
     items = [o for r in readers for o in r.objects]
     with _stage(context, rigs, items) as scene:
         depsgraph: Any = None
@@ -91,6 +95,12 @@ def sample(
                 reader.read(number, depsgraph)
             yield (number + 1) / len(frames)
     return [reader.samples for reader in readers]
+
+
+def _times(scene: bpy.types.Scene, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where Blender reads actions at frames of a scene, float64[N], rounded as it rounds them."""
+    length = np.float32(scene.render.frame_map_old / scene.render.frame_map_new)
+    return (frames.astype(np.float32) * length).astype(np.float64)
 
 
 @contextmanager
@@ -167,6 +177,7 @@ class _Reader:
         bones = [n for n in _BONES if n in self.controls.pose.bones]
         self.samples = Samples(
             frames=frames,
+            times=frames,
             raw=np.empty((count, width), np.float32),
             sliders=np.empty((count, width), np.float32),
             basis={n: np.empty((count, 4, 4)) for n in bones},

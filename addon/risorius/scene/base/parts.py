@@ -7,6 +7,7 @@ from typing import TypeGuard, cast
 
 import bpy
 
+from . import saved
 from .blender_types import ArmatureObject, Context, MeshObject
 
 RIG = "risorius_rig"  # on meshes and control armature: the deforming armature
@@ -52,6 +53,7 @@ PULL = "risorius_pull"  # on the deforming armature: its driver keeps the contro
 PINS = "risorius_pins"  # on the control armature: mesh and vertex of each pin of a drag, flat
 HANDLES_SELECTED = "risorius_handles_selected"  # on the same, like pins: handles that go together
 HANDLES_HIDDEN = "risorius_handles_hidden"  # on the same, like pins: handles that are not offered
+_MOST_MESHES = 1 << 16  # the numbers of a DNA file have 16 bits
 
 
 def rigs(linked: bool = False) -> list[ArmatureObject]:
@@ -65,12 +67,7 @@ def rigs(linked: bool = False) -> list[ArmatureObject]:
 
 def is_rig(item: bpy.types.Object) -> TypeGuard[ArmatureObject]:
     """Whether an object is the deforming armature of a character."""
-    return item.type == "ARMATURE" and _object(item, CONTROLS) is not None
-
-
-def _object(owner: bpy.types.ID, key: str) -> bpy.types.Object | None:
-    value = owner.get(key)
-    return value if isinstance(value, bpy.types.Object) else None
+    return item.type == "ARMATURE" and saved.item(item, CONTROLS) is not None
 
 
 def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
@@ -89,7 +86,7 @@ def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
 
 def controls_of(rig: ArmatureObject) -> ArmatureObject | None:
     """The control armature of a character, or None where it was deleted."""
-    controls = cast("ArmatureObject | None", _object(rig, CONTROLS))
+    controls = cast("ArmatureObject | None", saved.item(rig, CONTROLS))
     if controls is None or controls.type != "ARMATURE" or FACE not in controls.pose.bones:
         return None
     return controls
@@ -115,7 +112,7 @@ def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:
         return None
     if is_rig(item):
         return item
-    rig = _object(item, RIG)
+    rig = saved.item(item, RIG)
     return rig if rig is not None and is_rig(rig) else None
 
 
@@ -126,7 +123,7 @@ def maximum_of(controls: ArmatureObject) -> float:
 
 def members_of(rig: ArmatureObject) -> list[bpy.types.Object]:
     """All objects of a character that are there: rig, controls, meshes; also of a ruin."""
-    held = (rig, _object(rig, CONTROLS), *meshes_of(rig))
+    held = (rig, saved.item(rig, CONTROLS), *meshes_of(rig))
     return [item for item in held if item is not None]
 
 
@@ -135,17 +132,23 @@ def meshes_of(rig: ArmatureObject) -> list[MeshObject]:
     found = []
     for key in rig.keys():  # noqa: SIM118  Blender's ID is no dict
         if key.startswith(MESH_PREFIX):
-            item = _object(rig, key)
-            if item is not None and item.type == "MESH" and item.get(RIG) == rig:
-                found.append(cast("MeshObject", item))
+            item = saved.item(rig, key)
+            if item is not None and item.get(RIG) == rig and is_numbered(item):
+                found.append(item)
     return found
+
+
+def is_numbered(item: bpy.types.Object) -> TypeGuard[MeshObject]:
+    """Whether an object is a mesh that says which one of its DNA it is."""
+    number = item.get(MESH)
+    return item.type == "MESH" and isinstance(number, int) and 0 <= number < _MOST_MESHES
 
 
 def meshes_pointing_at(rig: ArmatureObject) -> list[MeshObject]:
     """All mesh objects of a character, also linked duplicates that it does not list."""
     listed = meshes_of(rig)
-    others = [o for o in bpy.data.objects if o.type == "MESH" and o.get(RIG) == rig]
-    return listed + [cast("MeshObject", o) for o in others if o not in listed]
+    others = [o for o in bpy.data.objects if o.get(RIG) == rig and is_numbered(o)]
+    return listed + [o for o in others if o not in listed]
 
 
 def active_rig(context: Context) -> ArmatureObject | None:

@@ -13,6 +13,8 @@ import bpy
 
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
+from . import parts
+from .blender_types import ArmatureObject
 
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
@@ -106,14 +108,20 @@ def content_hash(text: object) -> str:
     return digest if isinstance(digest, str) else ""
 
 
-def content(text: bpy.types.Text) -> bytes:
+def text_of(rig: ArmatureObject) -> bpy.types.Text | None:
+    """The Text that holds the file of a character. Args: rig  its deforming armature."""
+    text = rig.get(parts.DNA)
+    return text if isinstance(text, bpy.types.Text) else None
+
+
+def content(text: object) -> bytes:
     """The bytes of the DNA file that a Text holds.
 
     Raises:
-        ContentError: they were tampered with or damaged.
+        ContentError: they were tampered with or damaged, or this is no Text.
     """
-    packed = text.get(_BYTES)
-    if not isinstance(packed, bytes):
+    packed = text.get(_BYTES) if isinstance(text, bpy.types.Text) else None
+    if not isinstance(text, bpy.types.Text) or not isinstance(packed, bytes):
         raise ContentError(told("the Text holds no bytes of a DNA file"))
     content = _unpack(packed, _limit(text, packed))
     if hash_of(content) != content_hash(text):

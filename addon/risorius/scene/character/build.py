@@ -268,9 +268,9 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
     live = runtime.there(rig)
     trouble = []
     items = parts.meshes_of(rig)
-    total = sum(len(live.dna.meshes[i[parts.MESH]].blend_shape_targets) for i in items)
-    for item in items:
-        dna_mesh = live.dna.meshes[item[parts.MESH]]
+    found = [(i, m) for i in items if (m := runtime.dna_mesh(live, i)) is not None]
+    total = sum(len(dna_mesh.blend_shape_targets) for _item, dna_mesh in found)
+    for item, dna_mesh in found:
         chosen = mode
         if mode == "AUTO":
             chosen = meshes.automatic_mode(
@@ -288,7 +288,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 def remove(rig: ArmatureObject) -> None:
     """Take a character and all that belongs to it out of the file."""
     controls = parts.controls_of(rig)
-    text = rig.get(parts.DNA)
+    text = storage.text_of(rig)
     items = parts.meshes_of(rig)
     data = [i.data for i in (*items, rig, controls) if i is not None]
     used = [m for i in items for m in i.data.materials if m is not None]

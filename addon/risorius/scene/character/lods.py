@@ -6,25 +6,36 @@ from __future__ import annotations
 import bpy
 
 from ...logic.character import lod_distance as rules
-from ..base import parts
-from ..base.blender_types import ArmatureObject, Depsgraph
+from ..base import parts, saved
+from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 
+_COARSEST = 255  # far beyond the levels that a file has
 SAME = -1  # as the level of renders: that of the viewport
 
 
 def built(rig: ArmatureObject) -> list[int]:
     """The levels that a character has meshes for, in order."""
-    return sorted({int(v) for m in parts.meshes_of(rig) for v in m.get(parts.LODS, [])})
+    return sorted({level for item in parts.meshes_of(rig) for level in levels_of(item)})
+
+
+def levels_of(item: MeshObject) -> list[int]:
+    """The levels that show a mesh. Args: item  the mesh object."""
+    return saved.wholes(item, parts.LODS, 0, _COARSEST)
+
+
+def shows(item: MeshObject, level: int) -> bool:
+    """Whether a level shows a mesh, as each does where nothing is said. Args: item  the mesh."""
+    return parts.LODS not in item or level in levels_of(item)
 
 
 def viewport_level(rig: ArmatureObject) -> int:
     """The level that the viewport shows."""
-    return int(rig.get(parts.LOD, 0))
+    return saved.whole(rig, parts.LOD, 0, 0, _COARSEST)
 
 
 def render_level(rig: ArmatureObject) -> int:
     """The level that renders show, where the distance does not choose it."""
-    level = int(rig.get(parts.LOD_RENDER, SAME))
+    level = saved.whole(rig, parts.LOD_RENDER, SAME, SAME, _COARSEST)
     return viewport_level(rig) if level == SAME else level
 
 
@@ -50,6 +61,11 @@ def show(rig: ArmatureObject, viewport: int | None = None, render: int | None = 
     rig.update_tag()
 
 
+def distances(rig: ArmatureObject) -> list[float]:
+    """Where each level gives way to the next, in Blender units. Args: rig  deforming armature."""
+    return saved.numbers(rig, parts.LOD_DISTANCES, 0.0)
+
+
 def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) -> None:
     """Let the distance to the scene's camera choose the level, or no longer.
 
@@ -58,8 +74,8 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
         enable: whether it shall.
         size: of the face in Blender units, for the distances where there are none yet.
     """
-    if enable and not len(rig.get(parts.LOD_DISTANCES, ())):
-        levels = built(rig)
+    levels = built(rig)
+    if enable and levels and not distances(rig):
         rig[parts.LOD_DISTANCES] = rules.default_distances(levels[-1] + 1, size or 0.25)
         rig.property_overridable_library_set(f'["{parts.LOD_DISTANCES}"]', True)
     rig[parts.LOD_BY_DISTANCE] = bool(enable)
@@ -97,7 +113,7 @@ def choose(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph) -> i
         return kept
     level = rules.level_at(
         _distance(seen, camera.evaluated_get(depsgraph)),
-        list(rig.get(parts.LOD_DISTANCES, ())),
+        distances(rig),
         levels,
         None if rendering else kept,
     )
@@ -123,7 +139,7 @@ def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
         now = getattr(item, flag)
         if bool(item.get(written, now)) != now:
             item[users] = now
-        hidden = level not in list(item.get(parts.LODS, [level])) or bool(item.get(users))
+        hidden = not shows(item, level) or bool(item.get(users))
         if now != hidden:
             setattr(item, flag, hidden)
         if item.get(written) != hidden:

@@ -16,7 +16,7 @@ from ... import native
 from ...logic.base.space import Space
 from ...logic.character import plans, user_edits
 from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
-from ..base import compat, drivers, parts
+from ..base import compat, drivers, parts, saved
 from ..base.blender_types import ArmatureObject, MeshObject
 from .armatures import lock_place
 
@@ -311,11 +311,11 @@ def _to_keys(
 ) -> None:
     key = parts.keys_there(item)
     there = set(real_channels(item).values())
-    given = dict(key.get(parts.KEY_NAMES, {}))
-    order = [c for c in key.get(parts.KEY_ORDER, []) if c in deltas]
+    given = saved.table(key, parts.KEY_NAMES) or {}
+    order = [c for c in saved.wholes(key, parts.KEY_ORDER) if c in deltas]
     for channel in dict.fromkeys([*order, *deltas]):
         if channel not in there:
-            name = given.get(str(channel), labels[channel])
+            name = saved.text(given, str(channel), labels[channel])
             add_channel_key(item, rig, channel, name, deltas[channel])
     live = live_block(item)
     if live is not None:

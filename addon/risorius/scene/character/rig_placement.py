@@ -13,8 +13,9 @@ from typing import cast
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
+from numpy.typing import NDArray
 
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import ArmatureObject, Depsgraph
 
 CONSTRAINT = "Risorius Body"
@@ -29,13 +30,28 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
         rig: the deforming armature, the original.
         seen: the evaluated control armature.
     """
-    if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
+    if not _follows(rig):
         return
     wanted = np.array(seen.matrix_world)
-    near = np.abs(np.array(rig.matrix_basis) - wanted).max() <= _NEAR * np.abs(wanted).max()
     # Also what is only a rounding away is written: a frame shall not keep the one before it.
-    if written.is_new(written.places, rig, wanted.tobytes()) or not near:
+    if written.is_new(written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
         rig.matrix_basis = seen.matrix_world
+
+
+def has_strayed(rig: ArmatureObject) -> bool:
+    """Whether a rig that follows was moved by another hand. Args: rig  the original."""
+    last = written.places.get(rig.session_uid)
+    return isinstance(last, bytes) and _follows(rig) and not _is_at(rig, np.frombuffer(last))
+
+
+def _follows(rig: ArmatureObject) -> bool:
+    return bool(rig.get(parts.FOLLOW)) and not rig.parent and not rig.constraints
+
+
+def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
+    """Whether a rig is at a place, but for rounding. Args: wanted  float64, 16 numbers."""
+    there = np.array(rig.matrix_basis).ravel()
+    return bool(np.abs(there - wanted.ravel()).max() <= _NEAR * np.abs(wanted).max())
 
 
 def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
@@ -188,7 +204,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
     turns = {}
     for own, key in (("neck", parts.BODY_NECK), ("head", parts.BODY_HEAD)):
         total = Quaternion()
-        for name in controls.get(key, "").split("\n"):
+        for name in saved.text(controls, key).split("\n"):
             bone = seen.pose.bones.get(name)
             if bone is not None:
                 total = total @ own_turn(seen, bone)

@@ -18,8 +18,8 @@ from ...logic.base import names
 from ...logic.base.sentences import told
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import board_layout, board_table, plans
-from ..base import console, parts, storage, written
-from ..base.blender_types import ArmatureObject
+from ..base import console, parts, saved, storage, written
+from ..base.blender_types import ArmatureObject, MeshObject
 
 # The bones of the control armature beside those of a face board.
 CONTROL_BONES = (parts.FACE, "neck", "head", "eyes", "eye_L", "eye_R")
@@ -137,6 +137,7 @@ def _chain(dna: native.Dna, space: Space, joint: int) -> Chain:
 
 
 _cache: dict[tuple[str, float], Runtime | None] = {}
+_LEAST_UNIT, _MOST_UNIT = 1e-9, 1e9  # metres per Blender unit that a scene can have
 
 
 def of(rig: ArmatureObject) -> Runtime | None:
@@ -190,11 +191,20 @@ def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
             raise plans.PlanError(told("The file cannot be evaluated.")) from error
 
 
+def dna_mesh(live: Runtime, item: MeshObject) -> native.Mesh | None:
+    """The mesh of the file that an object shows, or None where the file has no such mesh.
+
+    Args:
+        live: the Runtime of the character.
+        item: one of `parts.meshes_of`.
+    """
+    number = saved.whole(item, parts.MESH, -1)
+    return live.dna.meshes[number] if 0 <= number < len(live.dna.meshes) else None
+
+
 def unit_of(rig: ArmatureObject) -> float:
     """Metres per Blender unit at import."""
-    unit = rig.get(parts.UNIT)
-    usable = isinstance(unit, int | float) and np.isfinite(unit) and unit > 0
-    return float(unit) if usable else 1.0
+    return saved.number(rig, parts.UNIT, 1.0, _LEAST_UNIT, _MOST_UNIT)
 
 
 def forget_unused(rigs: Iterable[ArmatureObject]) -> None:

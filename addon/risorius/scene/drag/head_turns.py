@@ -13,7 +13,7 @@ import numpy as np
 from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
-from ..base import parts
+from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 
@@ -45,7 +45,8 @@ class HeadTurns:
         """
         seen = rig.evaluated_get(depsgraph)
         self._live, self._bones, self._rests = live, seen.pose.bones, rig.data.bones
-        self._names = {b[parts.JOINT]: b.name for b in rig.data.bones if parts.JOINT in b}
+        numbers = ((saved.whole(b, parts.JOINT, -1), b.name) for b in rig.data.bones)
+        self._names = {joint: name for joint, name in numbers if joint >= 0}
         self._place = np.array(seen.matrix_world)
         self._parts: dict[int, Matrix] = {}
         neck, head = live.anchors.neck, live.anchors.head

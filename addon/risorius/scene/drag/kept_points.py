@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..base import parts
+from ..base import parts, saved
 from ..base.blender_types import ArmatureObject
 
 Point = tuple[int, int]  # a mesh of the DNA, one of its vertices
@@ -25,10 +25,7 @@ def of(rig: ArmatureObject, kind: str, counts: list[int]) -> list[Point]:
         counts: of the vertices of each mesh of its DNA; a point beyond them is another file's.
     """
     controls = parts.controls_of(rig)
-    flat = controls.get(kind, ()) if controls is not None else ()
-    if isinstance(flat, str | int | float):
-        return []
-    numbers = [int(n) for n in flat]
+    numbers = saved.wholes(controls, kind) if controls is not None else []
     pairs = zip(numbers[::2], numbers[1::2], strict=False)
     return [(m, v) for m, v in pairs if 0 <= m < len(counts) and 0 <= v < counts[m]]
 

@@ -174,7 +174,8 @@ def _copy_mesh(
     made = item.copy()
     made.data = item.data.copy()
     made.animation_data_clear()
-    name = live.dna.mesh_names[item[parts.MESH]]
+    known, number = live.dna.mesh_names, int(item[parts.MESH])
+    name = known[number] if number < len(known) else item.name
     loans.take("objects", made, name)
     loans.take("meshes", made.data, name)
     made.parent = rig_copy

@@ -11,7 +11,7 @@ import bpy
 
 from ... import native
 from ...logic.base.errors import FaceError
-from ..base import compat, parts
+from ..base import compat, parts, saved
 from ..base.blender_types import ArmatureObject
 
 
@@ -69,7 +69,7 @@ def page(
     """
     web = native.part("web")
     dna = native.module().load(content)
-    source = Path(bpy.path.abspath(str(rig.get(parts.SOURCE, ""))))
+    source = Path(bpy.path.abspath(saved.text(rig, parts.SOURCE)))
     heard = (sound.path.read_bytes(), sound.path.suffix, sound.offset) if sound else None
     title = rig.name.removesuffix("_rig")
     try:

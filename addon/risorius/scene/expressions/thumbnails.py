@@ -75,7 +75,7 @@ def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
     names = live.dna.mesh_names
     paints = {}  # by the mesh's name without its level: all levels share their materials
     for item in parts.meshes_of(rig):
-        index = int(item.get(parts.MESH, -1))
+        index = int(item[parts.MESH])
         if 0 <= index < len(names):
             paints.setdefault(without_lod(names[index]), list(item.data.materials))
     pixels: dict[str, NDArray[np.float32]] = {}

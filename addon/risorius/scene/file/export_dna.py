@@ -57,7 +57,7 @@ def export(
     if live is None:
         raise ExportError(told("{face} has lost the data of its file.", face=rig.name))
     try:
-        content = storage.content(rig[parts.DNA])
+        content = storage.content(rig.get(parts.DNA))
     except storage.ContentError as error:
         raise ExportError(
             told("{face} has lost the data of its file: {why}.", face=rig.name, why=error.args[0])

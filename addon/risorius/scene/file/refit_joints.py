@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...logic.base import names
 from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
-from ..base import parts
+from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures
 from .file_change import Change
@@ -62,9 +62,9 @@ def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
     """Joint -> bone name; of bones that bear the same joint the first is the file's."""
     found = {}
     for bone in rig.data.bones:
-        joint = bone.get(parts.JOINT)
-        if joint is not None:
-            found.setdefault(int(joint), bone.name)
+        joint = saved.whole(bone, parts.JOINT, -1, 0)
+        if joint >= 0:
+            found.setdefault(joint, bone.name)
     return found
 
 
@@ -277,11 +277,11 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
     """The new joint numbers on the bones, also on copies that the user made of them."""
     by_name = {name: joint for joint, name in enumerate(names)}
     for bone in rig.data.bones:
-        former = bone.get(parts.JOINT)
+        former = saved.whole(bone, parts.JOINT, -1, 0)
         if bone.name in by_name:
             bone[parts.JOINT] = by_name[bone.name]
-        elif former is not None:
-            there = moved[former] if former < len(moved) else -1
+        elif parts.JOINT in bone:
+            there = moved[former] if 0 <= former < len(moved) else -1
             if there >= 0:
                 bone[parts.JOINT] = there
             else:

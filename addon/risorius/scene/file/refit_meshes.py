@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
-from ..base import parts
+from ..base import parts, saved
 from ..base.blender_types import Attribute, MeshObject, Values
-from ..character import build, meshes, runtime, skin_weights
+from ..character import build, lods, meshes, runtime, skin_weights
 from . import transfer
 from .file_change import Change
 
@@ -84,7 +84,7 @@ def replace_meshes(change: Change, fresh_meshes: Mapping[int, MeshObject]) -> se
 
 def _relabel(item: MeshObject, new: plans.MeshPlan) -> None:
     item[parts.MESH] = new.index
-    if list(item.get(parts.LODS, [])) != list(new.lods):
+    if lods.levels_of(item) != list(new.lods):
         item[parts.LODS] = list(new.lods)
 
 
@@ -495,15 +495,16 @@ def _renumber(key: bpy.types.Key, channel_map: Sequence[int]) -> None:
 
     for name in (parts.REAL, parts.KEY_ORDER):
         if name in key:
-            moved = [there(int(c)) for c in key[name] if there(int(c)) >= 0]
+            moved = [there(c) for c in saved.wholes(key, name, 0) if there(c) >= 0]
             if moved:
                 key[name] = moved
             else:
                 del key[name]
     if parts.KEY_NAMES in key:
-        given = dict(key[parts.KEY_NAMES])
+        given = saved.table(key, parts.KEY_NAMES) or {}
+        numbers = {name: int(name) for name in given if name.isdecimal() and len(name) < 6}
         key[parts.KEY_NAMES] = {
-            str(there(int(c))): n for c, n in given.items() if there(int(c)) >= 0
+            str(there(c)): given[name] for name, c in numbers.items() if there(c) >= 0
         }
 
 
@@ -514,10 +515,10 @@ def finish_shapes(change: Change) -> None:
     there = parts.meshes_of(change.rig)
     built = {m[parts.MESH] for m in there}
     known = {i for i in change.mesh_map() if i >= 0}
-    modes = [m.get(parts.MODE) for m in there if m[parts.MESH] in known & built]
+    modes = [saved.text(m, parts.MODE, "LIVE") for m in there if m[parts.MESH] in known & built]
     usual = max(set(modes), key=modes.count) if modes else "LIVE"
     for item in there:
-        mode = item.get(parts.MODE, usual) if item[parts.MESH] in known else usual
-        meshes.set_mode(
-            item, change.rig, live.dna.meshes[item[parts.MESH]], live.space, labels, mode
-        )
+        mode = saved.text(item, parts.MODE, usual) if item[parts.MESH] in known else usual
+        dna_mesh = runtime.dna_mesh(live, item)
+        if dna_mesh is not None:
+            meshes.set_mode(item, change.rig, dna_mesh, live.space, labels, mode)

@@ -18,7 +18,7 @@ from ...logic.base import names
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...logic.character import plans
-from ..base import console, drivers, parts, written
+from ..base import console, drivers, parts, saved, storage, written
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, board, board_bones, build, lods, runtime
 from ..life import duplicates
@@ -160,25 +160,26 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
     """The file itself, its arrays, and what the armatures say about it."""
     rig, controls = change.rig, parts.controls_there(change.rig)
-    text, former = fresh[parts.DNA], rig[parts.DNA]
-    label = former.name
+    text, former = fresh[parts.DNA], storage.text_of(rig)
+    label = former.name if former is not None else text.name
     parts.point(rig, parts.DNA, text)
     rig[parts.SOURCE] = fresh[parts.SOURCE]
     # The new character loses its pointer, or its removal would take the Text along.
     del fresh[parts.DNA]
     used = [r.get(parts.DNA) for r in parts.rigs()]
-    if former not in used:
+    if former is not None and former not in used:
         bpy.data.texts.remove(former)
         if used.count(text) == 1:  # a Text that others share keeps its name
             text.name = label
     for name in armatures.LIVE_PROPERTIES:
-        if len(rig[name]) != len(fresh[name]):
-            del rig[name]  # an overridable array keeps its length
-            rig[name] = [0.0] * len(fresh[name])
+        if saved.length(rig, name) != saved.length(fresh, name):
+            rig.pop(name, None)  # an overridable array keeps its length
+            rig[name] = [0.0] * saved.length(fresh, name)
         rig.property_overridable_library_set(f'["{name}"]', True)
     levels = sorted({lod for mesh in change.new.meshes for lod in mesh.lods})
     for key in (parts.LOD, parts.LOD_RENDER):
-        if rig.get(key, lods.SAME) not in (*levels, lods.SAME):
+        if saved.whole(rig, key, lods.SAME - 1) not in (*levels, lods.SAME):
+            rig.pop(key, None)
             rig[key] = levels[0]
     # Bones, channels and maps have other numbers now: nothing that was written before counts.
     written.forget()

@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 
@@ -130,7 +130,8 @@ def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
 
 def _make_writer(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
     kept = rig.data.bones  # by name: after undo PoseBone.bone may point into freed memory
-    joints = [kept[b.name].get(parts.JOINT, -1) if b.name in kept else -1 for b in rig.pose.bones]
+    names = [bone.name for bone in rig.pose.bones]
+    joints = [saved.whole(kept[n], parts.JOINT, -1) if n in kept else -1 for n in names]
     where = [i for i, joint in enumerate(joints) if joint in live.owned]
     row_of = {joints[i]: row for row, i in enumerate(where)}
     shares = [("neck", joint, 1.0 / len(live.anchors.neck)) for joint in live.anchors.neck]

@@ -14,8 +14,10 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import ArmatureObject
+
+_MOST = 1000.0  # a weight beyond it is nobody's test
 
 
 def set_override(rig: ArmatureObject, channel: int, value: float) -> None:
@@ -50,8 +52,15 @@ def clear_all() -> bool:
 
 def current(rig: ArmatureObject | None) -> tuple[int, float] | None:
     """The override: (channel, value), or None."""
-    kept = rig.get(parts.TEST) if rig is not None else None
-    return (int(kept["channel"]), float(kept["value"])) if kept is not None else None
+    return _kept(rig)[0] if rig is not None and parts.TEST in rig else None
+
+
+def _kept(rig: ArmatureObject) -> tuple[tuple[int, float] | None, str]:
+    """The override of a character that has one, and what it was set under."""
+    kept = saved.table(rig, parts.TEST) or {}
+    channel = saved.whole(kept, "channel", -1, 0)
+    test = (channel, saved.number(kept, "value", 0.0, -_MOST, _MOST)) if channel >= 0 else None
+    return test, saved.text(kept, "under")
 
 
 def override(
@@ -67,17 +76,16 @@ def override(
     Returns:
         (channel, value), or None.
     """
-    kept = rig.get(parts.TEST)
-    if kept is None:
+    if parts.TEST not in rig:
         return None
+    test, kept = _kept(rig)
     digest = hashlib.sha1(raw.tobytes(), usedforsecurity=False).hexdigest()
     under = f"{scene.frame_current_final:.6f} {digest}"
-    if not kept["under"]:
-        kept["under"] = under
-    elif kept["under"] != under:
+    if test is None or kept not in ("", under):
         clear(rig)
         return None
-    return int(kept["channel"]), float(kept["value"])
+    rig[parts.TEST]["under"] = under
+    return test
 
 
 def apply(test: tuple[int, float] | None, weights: NDArray[np.float32]) -> None:

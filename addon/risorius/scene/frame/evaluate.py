@@ -17,7 +17,7 @@ import numpy as np
 
 from ... import native
 from ..animation import layers
-from ..base import drivers, parts, written
+from ..base import drivers, parts, saved, written
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import lods, rig_placement, runtime
 from . import (
@@ -207,7 +207,7 @@ def evaluate(
     _write_values(rig, pose)
     times.append(perf_counter())
     for item in parts.meshes_of(rig):
-        if lod in list(item.get(parts.LODS, [lod])):
+        if lods.shows(item, lod):
             live_keys.write(item, live, pose.blend_shapes, force, ahead)
     rig.update_tag(refresh={"OBJECT"})
     times.append(perf_counter())
@@ -240,5 +240,5 @@ def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
 def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:
     """Write channels and maps to the array properties that drivers read."""
     for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
-        if len(values) and len(rig.get(name, ())) == len(values):
+        if len(values) and saved.length(rig, name) == len(values):
             rig[name][:] = values.tolist()

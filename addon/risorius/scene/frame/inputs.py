@@ -127,7 +127,11 @@ def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.floa
     """
     values = dict(seen.pose.bones[parts.FACE].items())
     rests = live.rests
-    raw = np.array([values.get(label, rests[i]) for i, label in enumerate(live.labels)], np.float32)
+    found = [values.get(label, rests[i]) for i, label in enumerate(live.labels)]
+    try:
+        raw = np.array(found, np.float32)
+    except (TypeError, ValueError):  # words or a list: an edit makes the slider anew
+        raw = np.array([v if isinstance(v, int | float) else 0.0 for v in found], np.float32)
     if not np.isfinite(raw).all():
         np.nan_to_num(raw, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
     return raw

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import Depsgraph, MeshObject
 from ..character import meshes, runtime
 from . import bone_writer, caches
@@ -41,15 +41,14 @@ def write(
     block = meshes.live_block(item)
     if key is None or block is None or item.mode == "EDIT":
         return
-    index = item.get(parts.MESH, -1)
-    if not 0 <= index < len(live.dna.meshes):
+    if runtime.dna_mesh(live, item) is None:
         return  # the data in the .blend is another file's
-    morph = live.morph(index)
+    morph = live.morph(item[parts.MESH])
     if morph.vertex_count != len(block.points):
         return  # the user changed the topology
     if parts.REAL in key:
         weights = weights.copy()
-        weights[list(key[parts.REAL])] = 0.0
+        weights[saved.wholes(key, parts.REAL, 0, len(weights) - 1)] = 0.0
     state = weights[morph.channel_indices].tobytes()
     if not written.is_new(written.weights, key, state) and not force:
         return

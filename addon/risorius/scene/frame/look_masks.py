@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, written
+from ..base import parts, saved, written
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
@@ -51,7 +51,7 @@ def of(rig: ArmatureObject) -> Look:
     kept = rig.get(parts.LOOK)
     if not isinstance(kept, str):
         return WHOLE
-    renders, muted, *solo = kept.split("\n")
+    renders, muted, *solo = [*kept.split("\n"), ""][: max(2, kept.count("\n") + 1)]
     return Look(frozenset(solo), frozenset(muted.split()), renders == "1")
 
 
@@ -144,7 +144,7 @@ def take_away() -> bool:
     _held.clear()
     for rig in parts.rigs():
         if parts.LOOK in rig:
-            _held[rig.session_uid] = rig[parts.LOOK]
+            _held[rig.session_uid] = saved.text(rig, parts.LOOK)
             del rig[parts.LOOK]
             bring_up_later(rig)
     return bool(_held)
@@ -155,7 +155,7 @@ def give_back() -> bool:
     given = bool(_held)
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
-        if kept is not None:
+        if kept:
             rig[parts.LOOK] = kept
             bring_up_later(rig)
     _held.clear()

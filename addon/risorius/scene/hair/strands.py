@@ -36,7 +36,7 @@ def cards(rig: ArmatureObject) -> Iterator[tuple[MeshObject, str, int]]:
         return
     names, told = live.dna.mesh_names, live.dna.metadata
     for item in parts.meshes_of(rig):
-        number = int(item.get(parts.MESH, -1))
+        number = int(item[parts.MESH])
         name = names[number] if 0 <= number < len(names) else ""
         found = _ROWS.fullmatch(told.get(f"hair:{name}", ""))
         if found and len(item.data.vertices) % (2 * int(found[1])) == 0:

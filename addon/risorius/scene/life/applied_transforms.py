@@ -1,78 +1,281 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply Transform (Ctrl-A) on a control armature is taken back: the face takes its place from it.
+"""Apply Transform, Set Origin and their relatives on a part of a face are taken back.
 
-Blender moves what the object had into the bones, and the bones stay where they are. The face,
-which follows the object, would jump back to its own size and place.
+Joints, meshes and controls fit each other. Blender's steps move what an object had into its data:
+the rig, which follows the controls, would have its place twice, and a mesh would leave its joints.
+Blender asks nobody before and tells nobody after it, so what each part had is kept and compared.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
+from typing import cast
+
+import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Euler, Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
-from ..base import parts
-from ..base.blender_types import ArmatureObject
+from ...logic.base.sentences import Sentence, told
+from ..base import parts, written
+from ..base.blender_types import ArmatureObject, MeshObject
 
 _NEAR = 1e-5  # of the largest number: what multiplying in float32 leaves
+_FLAT = 1e-12  # a determinant below it: there is no way back
+_SAMPLES = 4  # vertices of a mesh that tell whether its data changed
+_BY_HAND = ("EDIT", "SCULPT")  # modes in which the user moves points
 
-_noted: dict[
-    int, tuple[NDArray[np.float64], NDArray[np.float64]]
-] = {}  # session uid of a control armature -> its matrix and its bones, as last seen
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a part had when it was last looked at.
+
+    Attributes:
+        own: its matrix, without parent and constraints.
+        hung: its parent inverse.
+        parent: session uid of its parent, 0 for none.
+        points: float32[N, 3] ends of its bones or some of its vertices; empty while the user
+            edits them.
+    """
+
+    own: Matrix
+    hung: Matrix
+    parent: int
+    points: bytes
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A part with its places in the world before and after a step, and what it had before it."""
+
+    item: bpy.types.Object
+    before: _Seen
+    stood: Matrix
+    stands: Matrix
+
+
+# Session uid of a part, or of what hangs on one -> what was seen of it.
+_noted: dict[int, _Seen] = {}
+_said: dict[int, Sentence] = {}  # session uid of a deforming armature -> what was taken back last
 
 
 def forget() -> None:
     """After load and undo: what was seen before says nothing about what is there."""
     _noted.clear()
+    _said.clear()
 
 
-def take_back(controls: ArmatureObject) -> list[str]:
-    """Give a control armature back what was just applied to it.
+def last_said(rig: ArmatureObject) -> Sentence | None:
+    """What was taken back at the last step. Args: rig  deforming armature of the face."""
+    return _said.get(rig.session_uid)
+
+
+def take_back(
+    rigs: Iterable[ArmatureObject], touched: AbstractSet[bpy.types.ID]
+) -> list[ArmatureObject]:
+    """Give the parts of faces back what one of Blender's steps just moved into their data.
 
     Args:
-        controls: a control armature of this file.
+        rigs: deforming armatures of this file.
+        touched: the datablocks of the update.
 
     Returns:
-        Sentences on what was done.
+        Those whose parts were given something back; `last_said` says what.
     """
-    if controls.mode == "EDIT" or controls.data.library or controls.data.override_library:
-        return []
-    before, now = _noted.get(controls.session_uid), _seen(controls)
-    _noted[controls.session_uid] = now
-    if before is None or not _was_applied(before, now):
-        return []
-    old, new = (Matrix(matrix.tolist()) for matrix in (before[0], now[0]))
-    back = old.inverted() @ new
-    controls.data.transform(back)
-    controls.matrix_basis = old
-    for child in controls.children:
-        if child.parent_type == "OBJECT" and child.library is None:
-            child.matrix_parent_inverse = back @ child.matrix_parent_inverse
-    controls.data.update_tag()
-    _noted[controls.session_uid] = _seen(controls)
-    return [
-        f"{controls.name} was given back the transform that was applied to it: the face takes "
-        "its size and place from the object."
-    ]
+    known = bool(_noted)
+    done = [rig for rig in rigs if _take_back(rig, touched)]
+    for item in touched if known else bpy.data.objects:
+        if isinstance(item, bpy.types.Object) and item.parent and parts.RIG not in item:
+            _noted[item.session_uid] = _see(item, None, touched)
+    return done
 
 
-def _seen(controls: ArmatureObject) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """float64[4, 4] the object's own matrix, float64[4, ends] of its control bones at rest."""
-    bones = [bone for bone in controls.data.bones if parts.PART in bone]
-    ends = [(*end, 1.0) for bone in bones for end in (bone.head_local, bone.tail_local)]
-    return np.array(controls.matrix_basis), np.array(ends).reshape(-1, 4).T
-
-
-def _was_applied(
-    before: tuple[NDArray[np.float64], NDArray[np.float64]],
-    now: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> bool:
-    """Whether the object's matrix changed, and the bones are where they were."""
-    (old, rests), (new, moved) = before, now
-    if rests.shape != moved.shape or not rests.size or np.array_equal(old, new):
+def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
+    members = [item for item in parts.members_of(rig) if item.library is None]
+    if rig.session_uid in _noted and touched.isdisjoint(members):
         return False
-    if abs(np.linalg.det(old)) < 1e-12:  # flat: there is no way back
+    before = {i: _noted[i.session_uid] for i in members if i.session_uid in _noted}
+    now = {item: _see(item, before.get(item), touched) for item in members}
+    _noted.update({item.session_uid: seen for item, seen in now.items()})
+    _said.pop(rig.session_uid, None)
+    stood = _places(rig, before, _followed(rig))
+    stands = _places(rig, now, {})
+    done = []
+    for item, seen in before.items():
+        moved = _Moved(item, seen, stood[item], stands[item])
+        if seen != now[item] and _give_back(moved, now[item], members):
+            _noted[item.session_uid] = _see(item, None, touched)
+            done.append(item.name)
+    if _clear_deltas(rig):
+        done.append(rig.name)
+    if done:
+        _said[rig.session_uid] = told(
+            "{names}: Blender's step was taken back, because joints, meshes and controls must fit. "
+            "To place the face, move {controls}.",
+            names=done[0] if len(done) == 1 else f"{done[0]} (+{len(done) - 1})",
+            controls=cast("bpy.types.Object", rig[parts.CONTROLS]).name,
+        )
+    return bool(done)
+
+
+def _see(item: bpy.types.Object, before: _Seen | None, touched: AbstractSet[bpy.types.ID]) -> _Seen:
+    """What a part has now; points are read only where something says that they changed."""
+    if before is not None and item not in touched:
+        return before
+    parent, data = item.parent.session_uid if item.parent is not None else 0, item.data
+    seen = _Seen(item.matrix_basis.copy(), item.matrix_parent_inverse.copy(), parent, b"")
+    if item.mode in _BY_HAND or data is None or data.library is not None:
+        return seen
+    if before is not None and seen.own == before.own and data not in touched:
+        return replace(seen, points=before.points)
+    if isinstance(data, bpy.types.Mesh):
+        return replace(seen, points=_samples(data))
+    if isinstance(data, bpy.types.Armature):
+        return replace(seen, points=_ends(data))
+    return seen
+
+
+def _samples(mesh: bpy.types.Mesh) -> bytes:
+    points, count = mesh.vertices, len(mesh.vertices)
+    chosen = range(0, count, max(1, count // _SAMPLES))
+    return np.array([points[i].co for i in chosen], np.float32).tobytes()
+
+
+def _ends(armature: bpy.types.Armature) -> bytes:
+    return b"".join(_read(armature.bones, name).tobytes() for name in ("head_local", "tail_local"))
+
+
+def _read(items: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32]:
+    """float32[N, 3]: a vector of each of many things."""
+    found = np.empty(3 * len(items), np.float32)
+    items.foreach_get(name, found)
+    return found.reshape(-1, 3)
+
+
+def _followed(rig: ArmatureObject) -> dict[bpy.types.Object, Matrix]:
+    """Where rig and controls stood when the rig last followed: frames make no update."""
+    controls, kept = parts.controls_of(rig), written.places.get(rig.session_uid)
+    if not isinstance(kept, bytes) or parts.BAKED in rig:
+        return {}
+    place = Matrix(np.frombuffer(kept).reshape(4, 4).tolist())
+    return {
+        item: place
+        for item in (rig, controls)
+        if item is not None and item.parent is None and not item.constraints
+    }
+
+
+def _places(
+    rig: ArmatureObject,
+    seen: Mapping[bpy.types.Object, _Seen],
+    known: Mapping[bpy.types.Object, Matrix],
+) -> dict[bpy.types.Object, Matrix]:
+    """Where the parts of a face are in the world, those with a foreign parent in its space."""
+    found = {item: known.get(item, _local(one)) for item, one in seen.items()}
+    carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
+    found.update({item: found[rig] @ found[item] for item in carried})
+    return found
+
+
+def _local(seen: _Seen) -> Matrix:
+    return seen.hung @ seen.own if seen.parent else seen.own
+
+
+def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object]) -> bool:
+    """Undo what was done to one part; returns whether something was."""
+    item, before = moved.item, moved.before
+    if before.parent != now.parent:
         return False
-    stood, stands = old @ rests, new @ moved
+    back = _way_back(moved, now)
+    if back is None:
+        shifted = _differ(before.own, now.own) or _differ(before.hung, now.hung)
+        if item.type != "MESH" or not shifted or not _is_held(item):
+            return False
+    else:
+        data = cast("bpy.types.Mesh | bpy.types.Armature", item.data)
+        if isinstance(data, bpy.types.Mesh):
+            data.transform(back, shape_keys=True)
+        else:
+            data.transform(back)
+        data.update_tag()
+    item.matrix_parent_inverse = before.hung
+    # Frames move an armature without an update, so what was noted of it may be of another frame.
+    same = item.parent is not None or now.own == before.own
+    item.matrix_basis = before.own if same else moved.stood
+    for child in item.children:
+        if child not in members and child.library is None:
+            _keep_in_place(child, moved)
+    return True
+
+
+def _clear_deltas(rig: ArmatureObject) -> bool:
+    """Make the deltas of a rig its own place: with them Blender itself applies wrongly."""
+    neutral = Vector(), Euler(), Quaternion(), Vector((1.0, 1.0, 1.0))
+    names = ("location", "rotation_euler", "rotation_quaternion", "scale")
+    if all(getattr(rig, f"delta_{n}") == v for n, v in zip(names, neutral, strict=True)):
+        return False
+    place = rig.matrix_basis.copy()
+    for name, value in zip(names, neutral, strict=True):
+        setattr(rig, f"delta_{name}", value)
+    rig.matrix_basis = place
+    return True
+
+
+def _differ(one: Matrix, other: Matrix) -> bool:
+    """Whether two matrices differ by more than rounding."""
+    first, second = np.array(one), np.array(other)
+    return bool(np.abs(first - second).max() > _NEAR * np.abs(first).max())
+
+
+def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
+    """What hangs on a part hangs as before: Blender keeps its place, but not under every bone."""
+    before = _noted.get(child.session_uid)
+    if before is not None and before.parent == moved.item.session_uid:
+        child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own
+
+
+def _is_held(item: bpy.types.Object) -> bool:
+    """Whether a part can be moved by nothing that asks: its place is locked and not animated."""
+    locked = all((*item.lock_location, *item.lock_rotation, *item.lock_scale))
+    return locked and item.animation_data is None and not item.constraints
+
+
+def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
+    """What brings a part's data to where they were, or None where no such step was done."""
+    old, new = (
+        np.frombuffer(seen.points, np.float32).reshape(-1, 3).astype(np.float64)
+        for seen in (moved.before, now)
+    )
+    if old.shape != new.shape or not old.size or np.array_equal(old, new):
+        return None
+    if abs(moved.stood.determinant()) < _FLAT:
+        return None
+    stood, stands = _at(moved.stood, old), _at(moved.stands, new)
     limit = _NEAR * np.abs(stood).max()
-    return np.abs(stood - stands).max() <= limit and np.abs(rests - moved).max() > limit
+    if np.abs(stood - stands).max() <= limit < np.abs(old - new).max():
+        return moved.stood.inverted() @ moved.stands
+    shift = (old - new).mean(axis=0)
+    near = _NEAR * max(np.abs(old).max(), np.abs(new).max())
+    if np.abs(old - new - shift).max() > near or np.abs(shift).max() <= near:
+        return None
+    # Where a constraint carries an object, Set Origin moves it by too much or too little.
+    told = moved.before.own.translation != now.own.translation or _is_centred(moved.item)
+    return Matrix.Translation(Vector(shift.tolist())) if told else None
+
+
+def _at(place: Matrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    matrix = np.array(place)
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _is_centred(item: bpy.types.Object) -> bool:
+    """Whether an object's data lie around its origin, as Geometry to Origin leaves them."""
+    if item.type == "MESH":
+        points = _read(cast("MeshObject", item).data.vertices, "co")
+    else:
+        points = np.frombuffer(_ends(cast("ArmatureObject", item).data), np.float32).reshape(-1, 3)
+    low, high, middle = points.min(axis=0), points.max(axis=0), points.mean(axis=0)
+    near = 10 * _NEAR * np.abs(high - low).max()
+    return bool(min(np.abs(low + high).max() / 2, np.abs(middle).max()) <= near)

@@ -139,8 +139,12 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
     """The characters that the updates concern: by their controls, their body or the camera."""
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
-    for update in depsgraph.updates:
-        item = update.id.original if update.id is not None else None
+    found = (u.id.original for u in depsgraph.updates if u.id is not None)
+    touched = {item for item in found if item is not None}
+    for rig in applied_transforms.take_back(parts.rigs(), touched):
+        console.say(str(applied_transforms.last_said(rig)))
+        _note_mended(rig)
+    for item in touched:
         if isinstance(item, bpy.types.Armature):
             bones_edited |= bone_edits.is_edited(item)
         elif isinstance(item, bpy.types.Action):
@@ -167,6 +171,7 @@ def _concerned(
     hold = rig_placement.body_of(controls) if controls is not None else None
     return (
         controls in armatures
+        or (rig in armatures and rig_placement.has_strayed(rig))
         or (hold is not None and hold.target in armatures)
         or (camera_moved and lods.by_distance(rig))
         or (bool(actions) and controls is not None and layers.plays(controls, actions))

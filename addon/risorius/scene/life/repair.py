@@ -13,14 +13,13 @@ from typing import cast
 import bpy
 
 from ...logic.character import plans
-from ..base import console, parts
+from ..base import console, parts, saved
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, build, meshes, runtime
-from . import applied_transforms
 
 
 def heal(rig: ArmatureObject) -> list[str]:
-    """Give control bones and sliders of a character their names back, and their place.
+    """Give control bones and sliders of a character their names back.
 
     Args:
         rig: its deforming armature, of this file.
@@ -32,7 +31,10 @@ def heal(rig: ArmatureObject) -> list[str]:
     if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":
         return []
     held = cast("ArmatureObject", controls)
-    return [*_bone_names(held), *_sliders(rig), *applied_transforms.take_back(held)]
+    pointed = saved.item(held, parts.RIG)
+    if held.library is None and (pointed is None or not parts.is_rig(pointed)):
+        parts.point(held, parts.RIG, rig)
+    return [*_bone_names(held), *_sliders(rig)]
 
 
 def heal_all() -> list[ArmatureObject]:
@@ -56,7 +58,7 @@ def _bone_names(controls: ArmatureObject) -> list[str]:
         return []
     done = []
     for bone in bones:
-        wanted = bone.get(parts.PART) or bone.get(parts.BOARD)
+        wanted = saved.text(bone, parts.PART) or saved.text(bone, parts.BOARD)
         if wanted and wanted != bone.name and wanted not in bones:
             done.append(f"The bone {bone.name} of {controls.name} was named {wanted} again.")
             bone.name = wanted
@@ -99,7 +101,7 @@ def missing(item: bpy.types.Object | None) -> list[str]:
     if rig is None:
         lost = item is not None and parts.RIG in item and item.get(parts.RIG) is None
         return ["The deforming armature of this face was deleted; undo brings it back."] * lost
-    controls = rig.get(parts.CONTROLS)
+    controls = saved.item(rig, parts.CONTROLS)
     found = []
     if item is not None and item.type == "ARMATURE" and item not in (rig, controls):
         found.append(
@@ -108,7 +110,7 @@ def missing(item: bpy.types.Object | None) -> list[str]:
         )
     if controls is None:
         found.append("The control armature was deleted; undo brings it back.")
-    elif parts.FACE not in controls.pose.bones:
+    elif controls.pose is None or parts.FACE not in controls.pose.bones:
         found.append(f"{controls.name} has lost its bone {parts.FACE}, which bears the sliders.")
     if not runtime.of(rig):
         text = rig.get(parts.DNA)

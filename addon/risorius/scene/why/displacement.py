@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...logic.base.space import world_matrices
 from ..base import parts
 from ..base.blender_types import ArmatureObject
-from ..character import meshes, runtime
+from ..character import lods, meshes, runtime
 
 Doubles = NDArray[np.float64]
 _skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = {}
@@ -208,5 +208,5 @@ def meshes_at(rig: ArmatureObject, lod: int) -> list[int]:
         rig: deforming armature.
         lod: the level.
     """
-    shown = [m for m in parts.meshes_of(rig) if lod in list(m.get(parts.LODS, [lod]))]
+    shown = [m for m in parts.meshes_of(rig) if lods.shows(m, lod)]
     return [int(m[parts.MESH]) for m in shown]

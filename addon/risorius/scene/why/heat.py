@@ -7,6 +7,7 @@ the deforming armature, so that undo finds it; a file never has any of it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from time import perf_counter
 from typing import cast
@@ -20,7 +21,7 @@ from ...logic.base import heat_ramp
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..animation import layers
-from ..base import parts
+from ..base import parts, saved
 from ..base.blender_types import (
     ArmatureObject,
     Attribute,
@@ -56,11 +57,12 @@ class Heat:
 
 def of(rig: ArmatureObject) -> Heat | None:
     """The heat map that a character shows. Args: rig  its deforming armature."""
-    kept = rig.get(parts.HEAT)
-    if not isinstance(kept, str):
+    kind, *rest = saved.text(rig, parts.HEAT).split("\n", 2)
+    try:
+        most, what = float(rest[0]), rest[1]
+    except (ValueError, IndexError):
         return None
-    kind, most, what = kept.split("\n", 2)
-    return Heat(kind, what, float(most))
+    return Heat(kind, what, most) if math.isfinite(most) else None
 
 
 def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Heat:
@@ -169,7 +171,7 @@ def _take_off(item: MeshObject) -> None:
         held.remove(layer)
         data.update_tag()
     if parts.HEAT_BEFORE in data:
-        active, default = data[parts.HEAT_BEFORE].split("\n", 1)
+        active, _end, default = saved.text(data, parts.HEAT_BEFORE).partition("\n")
         del data[parts.HEAT_BEFORE]
         if active in held:
             held.active_color_name = active

@@ -7,7 +7,7 @@ import numpy as np
 from ... import native
 from ...scene.base import console, parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import meshes, runtime
+from ...scene.character import lods, meshes, runtime
 from .. import words
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig, usable
@@ -37,12 +37,13 @@ def describe(rig: ArmatureObject) -> list[str]:
         words.say("Hair, clothes and grooms are not in DNA files."),
     ]
     for item in parts.meshes_of(rig):
-        targets = live.dna.meshes[item[parts.MESH]].blend_shape_targets
+        dna_mesh = runtime.dna_mesh(live, item)
+        targets = dna_mesh.blend_shape_targets if dna_mesh is not None else ()
         real = len(meshes.real_channels(item))
         still = [
             names[t.blend_shape_channel_index] for t in targets if not np.any(np.asarray(t.deltas))
         ]
-        levels = ", ".join(str(level) for level in item[parts.LODS])
+        levels = ", ".join(str(level) for level in lods.levels_of(item))
         line = words.say(
             "{mesh}: level {levels}, {vertices:,} vertices, {channels} channels move it, "
             "{real} of them as real keys.",

@@ -11,6 +11,7 @@ from ... import native
 from ...logic.animation.clip_units import ClipError
 from ...logic.base.names import printable
 from ...scene.animation import actions, board_keys, clip_actions, layers
+from ...scene.base import saved
 from ...scene.frame import evaluate
 from ..blender_types import Context, UILayout
 from ..common import FaceOperator, face_controls, face_rig
@@ -125,5 +126,5 @@ class PlacesClip(FaceOperator):
 
 def report_of(action: bpy.types.Action | None) -> list[str]:
     """What was said when an action was imported: lines."""
-    text = action.get(_REPORT, "") if action is not None else ""
-    return text.split("\n") if isinstance(text, str) and text else []
+    text = saved.text(action, _REPORT) if action is not None else ""
+    return text.split("\n") if text else []

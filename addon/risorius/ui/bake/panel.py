@@ -3,7 +3,7 @@
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.frame import caches, lateness
+from ...scene.frame import caches, hindrances, lateness
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel
@@ -39,7 +39,8 @@ def draw_state(layout: UILayout, rig: ArmatureObject) -> None:
         words.write(box, text, "ACTION")
         box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
     caches.look()
-    for late in filter(None, (lateness.words(rig), caches.words(rig))):
+    said = (lateness.words(rig), caches.words(rig), *hindrances.words(rig))
+    for late in filter(None, said):
         words.write(layout, late, "ERROR")
 
 

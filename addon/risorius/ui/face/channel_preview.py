@@ -36,7 +36,8 @@ def _channels(_operator: object, context: bpy.types.Context | None) -> list[Item
         return _items
     moved = set()
     for item in parts.meshes_of(rig):
-        targets = live.dna.meshes[item[parts.MESH]].blend_shape_targets
+        dna_mesh = runtime.dna_mesh(live, item)
+        targets = dna_mesh.blend_shape_targets if dna_mesh is not None else ()
         moved.update(int(t.blend_shape_channel_index) for t in targets)
     labels = build.channel_labels(live.dna)
     _items.extend((str(c), labels[c], live.dna.blend_shape_channel_names[c]) for c in sorted(moved))

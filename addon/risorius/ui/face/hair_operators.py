@@ -5,7 +5,7 @@
 
 import bpy
 
-from ...scene.base import parts
+from ...scene.character import runtime
 from ...scene.hair import strands
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
@@ -26,7 +26,7 @@ class RISORIUS_OT_set_strands(FaceOperator, Operator):
         if not self.enable:
             strands.hide(rig)
             return {"FINISHED"}
-        unit = float(rig.get(parts.UNIT, 1.0))
+        unit = runtime.unit_of(rig)
         if not strands.show(rig, unit):
             self.report({"ERROR"}, say("This face has no cards of hair."))
             return {"CANCELLED"}

@@ -3,7 +3,7 @@
 
 from ... import native
 from ...logic.character import plans
-from ...scene.base import parts
+from ...scene.base import parts, saved
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import lods, rig_placement, runtime
 from ...scene.hair import strands
@@ -119,7 +119,7 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
             button.lod, button.target = level, target
     column.operator("risorius.set_lod_by_distance", depress=auto).enable = not auto
     if auto:
-        for level in range(min(len(rig[parts.LOD_DISTANCES]), levels[-1])):
+        for level in range(min(len(lods.distances(rig)), levels[-1])):
             column.prop(
                 rig,
                 f'["{parts.LOD_DISTANCES}"]',
@@ -130,7 +130,7 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
 
 
 def _draw_shapes(layout: UILayout, rig: ArmatureObject) -> None:
-    modes = {m.get(parts.MODE) for m in parts.meshes_of(rig)}
+    modes = {saved.text(m, parts.MODE) for m in parts.meshes_of(rig)}
     row = layout.row(align=True)
     row.label(text="Shapes", text_ctxt=words.CONTEXT)
     for mode, text in (("LIVE", "Live"), ("KEYS", "Keys")):

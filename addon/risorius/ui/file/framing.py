@@ -11,6 +11,7 @@ from mathutils import Quaternion, Vector
 from ...logic.character import view_fit
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import lods
 from ..blender_types import Context
 
 _FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
@@ -73,8 +74,8 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
 def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
     """Middle and radius of the head, else of all meshes of the finest level that is built."""
     items = parts.meshes_of(rig)
-    first = min((min(item[parts.LODS]) for item in items), default=0)
-    shown = [item for item in items if first in list(item[parts.LODS])]
+    first = min((min(lods.levels_of(item), default=0) for item in items), default=0)
+    shown = [item for item in items if lods.shows(item, first)]
     heads = [item for item in shown if "head" in item.data.name.rpartition("_lod")[0].lower()]
     corners = np.array(
         [item.matrix_world @ Vector(c) for item in heads or shown for c in item.bound_box]

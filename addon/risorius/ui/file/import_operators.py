@@ -9,7 +9,7 @@ import bpy
 
 from ... import native
 from ...logic.base import names
-from ...scene.base import parts
+from ...scene.base import parts, saved
 from ...scene.character import build, rig_placement
 from ...scene.file import sample_face
 from ...scene.frame import evaluate
@@ -65,7 +65,7 @@ def import_character(
             {"WARNING"}, words.say("and {count} more warnings", count=len(warnings) - 5)
         )
     count = len(parts.meshes_of(rig))
-    found = rig.get(parts.TEXTURES, "")
+    found = saved.text(rig, parts.TEXTURES)
     if found:
         operator.report({"INFO"}, words.say("Textures of {found}", found=found))
     operator.report(

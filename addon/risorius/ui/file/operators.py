@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 
 from ... import native
-from ...scene.base import parts
+from ...scene.base import parts, saved
 from ...scene.file import export_dna, replace_dna
 from ...scene.frame import evaluate
 from ..blender_types import Context, ExportHelper, ImportHelper, Menu, Operator, Result
@@ -87,7 +87,7 @@ class RISORIUS_OT_reload(_FileOperator, Operator):
 
     @staticmethod
     def _path(context: Context) -> str:
-        return bpy.path.abspath(face_rig(context).get(parts.SOURCE, ""))
+        return bpy.path.abspath(saved.text(face_rig(context), parts.SOURCE))
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         path = self._path(context)

@@ -2,7 +2,7 @@
 """Words and buttons of the panel Face for what keeps a face from moving."""
 
 from ...scene.base import parts
-from ...scene.life import library_overrides, migrations, repair
+from ...scene.life import applied_transforms, library_overrides, migrations, repair
 from .. import words
 from ..blender_types import Context, UILayout
 from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, override_trouble
@@ -27,6 +27,9 @@ def draw_trouble(layout: UILayout, context: Context) -> bool:
         words.write(layout, "Linked: make an override to animate.", "LINKED")
         layout.operator_menu_enum(RISORIUS_OT_make_override.bl_idname, "shapes")
         return True
+    said = applied_transforms.last_said(active) if active is not None else None
+    if said is not None:
+        words.write(layout, said, "INFO")
     broken = override_trouble(active)
     if broken:
         words.write(layout, broken, "ERROR")

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ... import native
-from ...scene.base import parts
+from ...scene.base import parts, saved
 from ...scene.character import build
 from ...scene.mixing import parents
 from ..blender_types import Context, ExportHelper, ImportHelper, Operator, Result
@@ -82,7 +82,7 @@ class RISORIUS_OT_mix_add_scene(_Usable, Operator):
     bl_label = "Add the Scene's Faces"
 
     def execute(self, context: Context) -> Result:
-        paths = [bpy.path.abspath(rig.get(parts.SOURCE, "")) for rig in parts.rigs(linked=True)]
+        paths = [bpy.path.abspath(saved.text(rig, parts.SOURCE)) for rig in parts.rigs(linked=True)]
         paths = [path for path in dict.fromkeys(paths) if path]
         if not paths:
             self.report({"ERROR"}, say("There is no face in this scene."))

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Custom properties of a .blend, which may hold anything: words, no number, numbers of any size.
+
+What is of another kind or out of range counts as if it was not there. Tables and arrays are copied:
+they point into Blender's memory, which is freed when the property goes.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping
+from typing import cast
+
+import bpy
+from idprop.types import IDPropertyArray, IDPropertyGroup
+
+_MOST = 2**31 - 1  # Blender's whole numbers
+
+
+# A datablock, a bone, or a table in one.
+Owner = bpy.types.bpy_struct | Mapping[str, object]
+
+
+def whole(owner: Owner, key: str, default: int, low: int = -_MOST, high: int = _MOST) -> int:
+    """A whole number.
+
+    Args:
+        owner: what has the property.
+        key: its name.
+        default: where there is none within the range.
+        low, high: the range, with its ends.
+    """
+    found = owner.get(key)
+    if isinstance(found, float) and found.is_integer():
+        found = int(found)
+    return int(found) if isinstance(found, int) and low <= found <= high else default
+
+
+def number(
+    owner: Owner,
+    key: str,
+    default: float,
+    low: float = -sys.float_info.max,
+    high: float = sys.float_info.max,
+) -> float:
+    """A finite number. Args: owner, key, default, low, high  as for `whole`."""
+    found = owner.get(key)
+    usable = isinstance(found, int | float) and math.isfinite(found) and low <= found <= high
+    return float(cast("float", found)) if usable else default
+
+
+def text(owner: Owner, key: str, default: str = "") -> str:
+    """Words. Args: owner, key, default  as for `whole`."""
+    found = owner.get(key)
+    return found if isinstance(found, str) else default
+
+
+def wholes(owner: Owner, key: str, low: int = -_MOST, high: int = _MOST) -> list[int]:
+    """The whole numbers of a list that are in a range.
+
+    Args:
+        owner, key, low, high: as for `whole`.
+    """
+    return [n for n in _entries(owner, key) if type(n) is int and low <= n <= high]
+
+
+def numbers(owner: Owner, key: str, low: float = -math.inf, high: float = math.inf) -> list[float]:
+    """The finite numbers of a list that are in a range.
+
+    Args:
+        owner, key, low, high: as for `whole`.
+    """
+    found = [float(n) for n in _entries(owner, key) if isinstance(n, int | float)]
+    return [n for n in found if math.isfinite(n) and low <= n <= high]
+
+
+def texts(owner: Owner, key: str) -> list[str]:
+    """The words of a list. Args: owner, key  as for `whole`."""
+    return [word for word in _entries(owner, key) if isinstance(word, str)]
+
+
+def table(owner: Owner, key: str) -> Mapping[str, object] | None:
+    """A copy of a table, or None where there is none. Args: owner, key  as for `whole`."""
+    found = owner.get(key)
+    return (
+        cast("dict[str, object]", found.to_dict()) if isinstance(found, IDPropertyGroup) else None
+    )
+
+
+def item(owner: Owner, key: str) -> bpy.types.Object | None:
+    """The object that is pointed to, or None. Args: owner, key  as for `whole`."""
+    found = owner.get(key)
+    return found if isinstance(found, bpy.types.Object) else None
+
+
+def length(owner: Owner, key: str) -> int:
+    """How many numbers an array has; 0 where there is none. Args: owner, key  as for `whole`."""
+    found = owner.get(key)
+    return len(cast("list[float]", found)) if isinstance(found, IDPropertyArray) else 0
+
+
+def _entries(owner: Owner, key: str) -> list[object]:
+    found = owner.get(key)
+    if isinstance(found, IDPropertyArray):
+        return cast("list[object]", found.to_list())
+    return cast("list[object]", found) if isinstance(found, list) else []
