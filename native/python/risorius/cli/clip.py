@@ -65,7 +65,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--full-value",
-        type=float,
+        type=number(0.0, above=True),
         metavar="N",
         help="value of IN that is a whole movement: 100 for per cent, 255 for bytes; 1 keeps "
         "values however large (default: 1, and far larger ones are refused)",

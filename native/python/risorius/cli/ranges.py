@@ -14,7 +14,7 @@ from ..base.errors import ArgumentError
 from ..base.words import counted
 from ..importing import Imported, Report
 from ..ranges import MOST_GAIN, Ranges, learn, load_ranges, ranges_text
-from .files import CommandLineError, refuse_same_file, require_suffix, require_writable
+from .files import CommandLineError, number, refuse_same_file, require_suffix, require_writable
 
 _HEADINGS = ("control", "neutral", "extreme", "gain", "left as captured")
 
@@ -49,7 +49,7 @@ def add_learn(
     )
     parser.add_argument(
         "--most-gain",
-        type=float,
+        type=number(1.0, 4.0),
         default=MOST_GAIN,
         metavar="X",
         help=f"controls that would need more are left as captured, 1 to 4 (default {MOST_GAIN:g}; "
@@ -60,8 +60,6 @@ def add_learn(
 
 def _run(args: argparse.Namespace, load: Callable[[argparse.Namespace], Imported]) -> int:
     require_suffix(args.output, (".toml",), "-o")
-    if not 1.0 <= args.most_gain <= 4.0:
-        raise CommandLineError(f"--most-gain: 1 to 4 was expected, found {args.most_gain:g}")
     refuse_same_file(str(args.input), str(args.output))
     if args.output.exists():
         raise CommandLineError(f"{args.output}: it is there already")
