@@ -286,3 +286,49 @@ def other_face(**options):
     offsets[2] += [0.5, 1.0, 0.0]  # the neck
     dna.neutral_joint_translations = offsets
     return dna
+
+
+TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
+UP, SIDE = 1, 2  # poses of neck_face
+# What each pose is at: the rotations of neck_01 and head against rest, about their own axes.
+NECK_POSES = (
+    (0, 0, 0, 1, 0, 0, 0, 1),
+    (0, 0, 0.0871557, 0.9961947, 0, 0, 0.2164396, 0.9762960),
+    (0.1305262, 0, 0, 0.9914449, 0.2588190, 0, 0, 0.9659258),
+)
+
+
+def neck_face(**options):
+    """The small face, whose solver repairs the neck when neck and head turn.
+
+    The raw controls of TURNING hold rotations of joints; a solver's poses NECK_POSES drive the
+    channels 4 and 5, and the pose UP with the open jaw a corrective, which drives channel 2.
+    """
+    dna = small_face(**options)
+    count = len(CONTROLS)
+    renumbered(dna, controls=[*range(count), *TURNING])
+    raw = count + len(TURNING)
+    pose = raw + 2
+    dna.psd_count = 2
+    dna.psds = risorius.Psds(
+        rows=[raw, raw, raw + 1, raw + 1], columns=[0, 1, pose + UP, 0], values=[1.0] * 4
+    )
+    channels = dna.blend_shape_channels
+    channels.input_indices = [0, 1, raw + 1, raw, pose + UP, pose + SIDE]
+    dna.joint_column_count = pose + len(NECK_POSES)
+    dna.rbf_behavior.lod_solver_mapping = [[0], [0]]
+    dna.rbf_behavior.solvers = [
+        risorius.RbfSolver(
+            name="neck", raw_control_indices=range(count, raw),
+            pose_indices=range(len(NECK_POSES)), raw_control_values=np.ravel(NECK_POSES),
+            radius=1.0, automatic_radius=0, solver_type=1, distance_method=1,
+            normalize_method=0, function_type=0, twist_axis=0, weight_threshold=0.001,
+        )
+    ]  # fmt: skip
+    dna.rbf_behavior.poses = [risorius.RbfPose(name=n, scale=1) for n in ("rest", "up", "side")]
+    dna.rbf_behavior_ext.pose_control_names = ["neck_rest", "neck_up", "neck_side"]
+    dna.rbf_behavior_ext.poses = [
+        risorius.RbfPoseControls(output_control_indices=[pose + i], output_control_weights=[1.0])
+        for i in range(len(NECK_POSES))
+    ]
+    return dna

@@ -449,7 +449,8 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
 // In: files  of 20, of 60 and of all controls, or nullptr
 //     clip   frames of a real clip, or nullptr
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
-  for (const std::size_t active : {1u, 5u, 20u, 60u, 100u, 140u, 190u}) {
+  // Captures move 60 to 100 raw controls, so these rows come first.
+  for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
     // The rows that others are compared with are there for small faces too.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr

@@ -1,22 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Makes a DNA file of a real MetaHuman's size and shape, with no content of one.
+"""Make a DNA file with the size, the shape and the names of a real MetaHuman head.
 
     python tests/fullscale/generate.py OUT.dna [--seed N] [--deltas-per-channel N]
 
-870 joints, 800 channels that move about 800 vertices each, a head of 24,000 vertices and 7 more
-meshes, 8 LODs, 260 raw controls; centimetres, y up, degrees. Like real files it holds what trips
-readers: GUI controls that drive nothing, raw controls that no GUI control drives, a name of 100
-characters, equal names and 12 influences a vertex. The same seed gives the same bytes.
+870 joints; 174 GUI controls; 263 raw controls, of which 251 are expressions and 12 hold the
+rotations of `neck_01`, `neck_02` and `head`; 545 correctives of 2 to 20 factors up to 4; a solver
+of 18 poses whose outputs are factors of correctives; 122 joint groups that fill 15 % of the merged
+matrix; 782 channels; 50 meshes on 8 LODs with 12, 8 and 4 influences a vertex; centimetres, y up,
+degrees. The same seed gives the same bytes. No value of a real file is in it but two neck poses,
+which a public test states.
+
+Like real files it holds content on which readers fail: GUI controls that drive nothing, raw
+controls that no GUI control drives, a name of 100 characters, and equal names.
 
 With --deltas-per-channel the meshes are one head per LOD instead, each with half the vertices of
-the one before and shapes only for its LOD's channels: what reading by LOD is measured with.
+the one before and shapes only for its LOD's channels: the input of measurements of reading by LOD.
 2500 gives a file of 50 MB.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
+import tomllib
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -25,39 +32,67 @@ from pathlib import Path
 import numpy as np
 import risorius
 from numpy.typing import NDArray
-from risorius.controls import arkit
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int64]
 Triple = tuple[float, float, float]
 Shape = tuple[str, tuple[int, int], Triple, Triple]  # name, grid, radii in cm, centre
 
+PROJECT = Path(__file__).resolve().parents[2]
 JOINTS = 870
-CHANNELS = 800
-RAW = 260
-CORRECTIVES = CHANNELS - RAW
+CHANNELS = 782
+EXPRESSIONS = 251
+DRIVERS = ("neck_01", "neck_02", "head")  # joints whose rotation raw controls hold
+RAW = EXPRESSIONS + 4 * len(DRIVERS)
+CORRECTIVES = 545
+POSES = 18
+CONTROLS = RAW + CORRECTIVES + POSES
 GUI = 174
 IDLE_GUI = 10  # GUI controls that drive nothing
-RAW_ONLY = 40  # raw controls that no GUI control drives
-MAPS = 80
+RAW_ONLY = 18 + 4 * len(DRIVERS)  # raw controls that no GUI control drives
+MAPS = 82
 LODS = 8
-GROUPS = 60
-INFLUENCES = 12
+GROUPS = 122
+FILLED = 0.149  # of the merged matrix of the joint groups
 HEAD_CENTRE = (0.0, 150.0, 0.0)
-MESHES: tuple[Shape, ...] = (
-    ("head_lod0_mesh", (150, 160), (7.5, 12.0, 9.5), HEAD_CENTRE),
-    ("teeth_lod0_mesh", (60, 70), (2.5, 1.5, 3.0), (0.0, 145.0, 5.0)),
-    ("saliva_lod0_mesh", (25, 40), (2.3, 1.0, 2.8), (0.0, 145.0, 5.0)),
-    ("eyeLeft_lod0_mesh", (22, 35), (1.2, 1.2, 1.2), (3.2, 153.0, 7.0)),
-    ("eyeRight_lod0_mesh", (22, 35), (1.2, 1.2, 1.2), (-3.2, 153.0, 7.0)),
-    ("eyeshell_lod0_mesh", (25, 30), (4.5, 1.4, 1.3), (0.0, 153.0, 7.4)),
-    ("eyelashes_lod0_mesh", (40, 50), (4.6, 1.5, 1.4), (0.0, 153.0, 7.5)),
-    ("eyeEdge_lod0_mesh", (25, 40), (4.4, 1.3, 1.2), (0.0, 153.0, 7.3)),
+# Rotations of neck_01, neck_02 and head in degrees, and the axis of the joint.
+NECK_POSES: tuple[tuple[str, int, Triple], ...] = (
+    ("default", 2, (0, 0, 0)),
+    ("turnUp_55", 2, (10, 20, 25)),
+    ("turnUp_25", 2, (5, 9, 11)),
+    ("turnDown_50", 2, (-10, -20, -25)),
+    ("turnDown_25", 2, (-5, -9, -11)),
+    ("turnLeft_80", 0, (20, 25, 35)),
+    ("turnLeft_40", 0, (10, 13, 17)),
+    ("turnRight_80", 0, (-20, -25, -35)),
+    ("turnRight_40", 0, (-10, -13, -17)),
+    ("tiltLeft_45", 1, (12, 15, 18)),
+    ("tiltLeft_20", 1, (5, 7, 8)),
+    ("tiltRight_45", 1, (-12, -15, -18)),
+    ("tiltRight_20", 1, (-5, -7, -8)),
+    ("fwd", 2, (-25, -5, 30)),
+    ("back", 2, (20, 5, -25)),
+    ("fwdDown", 2, (-25, -15, 5)),
+    ("backUp", 2, (20, 15, -5)),
+    ("nod", 2, (0, 0, -20)),
 )
+MESHES: tuple[Shape, ...] = (
+    ("head", (150, 160), (7.5, 12.0, 9.5), HEAD_CENTRE),
+    ("teeth", (60, 70), (2.5, 1.5, 3.0), (0.0, 145.0, 5.0)),
+    ("eyeLeft", (22, 35), (1.2, 1.2, 1.2), (3.2, 153.0, 7.0)),
+    ("eyeRight", (22, 35), (1.2, 1.2, 1.2), (-3.2, 153.0, 7.0)),
+    ("eyelashes", (40, 50), (4.6, 1.5, 1.4), (0.0, 153.0, 7.5)),
+    ("eyeshell", (25, 30), (4.5, 1.4, 1.3), (0.0, 153.0, 7.4)),
+    ("eyeEdge", (25, 40), (4.4, 1.3, 1.2), (0.0, 153.0, 7.3)),
+    ("saliva", (25, 40), (2.3, 1.0, 2.8), (0.0, 145.0, 5.0)),
+    ("cartilage", (12, 16), (4.3, 0.8, 0.8), (0.0, 153.0, 7.2)),
+)
+MESHES_OF_LOD = (9, 9, 8, 6, 6, 4, 4, 4)
+INFLUENCES = (12, 12, 12, 8, 8, 8, 4, 4)
 # One head per LOD: the grid of each has half the vertices of the one before.
 HEADS: tuple[Shape, ...] = tuple(
     (
-        f"head_lod{lod}_mesh",
+        "head",
         (round(150 * 2 ** (-lod / 2)), round(160 * 2 ** (-lod / 2))),
         (7.5, 12.0, 9.5),
         HEAD_CENTRE,
@@ -66,16 +101,36 @@ HEADS: tuple[Shape, ...] = tuple(
 )
 
 
+def expression_names() -> list[str]:
+    """The names of the facial expressions, of which the last is 100 characters long."""
+    words = PROJECT / "addon" / "risorius" / "language" / "controls_en.toml"
+    rows = [row for row in tomllib.loads(words.read_text(encoding="utf-8")) if row != "sides"]
+    known = [row.replace("*", side) for row in rows for side in ("LR" if "*" in row else " ")]
+    names = [f"CTRL_expressions.{name}" for name in known][: EXPRESSIONS - 1]
+    names += [f"CTRL_expressions.extra{i:02d}" for i in range(EXPRESSIONS - 1 - len(names))]
+    return [*names, "CTRL_expressions.".ljust(100, "x")]
+
+
 def raw_names() -> list[str]:
-    """Known names first, generated ones after them, one of them 100 characters long."""
-    known = list(dict.fromkeys(name for row in arkit.mapping().values() for name in row))[:200]
-    made = [f"CTRL_expressions.generated{i:03d}" for i in range(RAW - len(known))]
-    made[-1] = "CTRL_expressions.".ljust(100, "x")
-    return known + made
+    return expression_names() + [f"{joint}.q{part}" for joint in DRIVERS for part in "xyzw"]
+
+
+def channel_names() -> list[str]:
+    """A channel for each expression, then one for each corrective; the first two have one name."""
+    single = [_snake(name.partition(".")[2][:50]) for name in expression_names()]
+    names = [f"head__{name}" for name in single]
+    names += [f"head__cor_{i:03d}" for i in range(CHANNELS - len(names))]
+    return [names[1], *names[1:]]
+
+
+def _snake(name: str) -> str:
+    """`eyeBlinkL` as `eye_blink_L`."""
+    words = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z]+(?![a-z])", name)
+    return "_".join(word if word in {"L", "R"} else word.lower() for word in words)
 
 
 def joint_names() -> list[str]:
-    names = ["spine_04", "neck_01", "neck_02", "head", "FACIAL_L_Eye", "FACIAL_R_Eye"]
+    names = ["spine_04", *DRIVERS, "FACIAL_L_Eye", "FACIAL_R_Eye"]
     names += [f"FACIAL_{'LRC'[i % 3]}_Skin{i:03d}" for i in range(JOINTS - len(names))]
     names[-1] = names[-2]
     return names
@@ -85,20 +140,25 @@ def joint_count(lod: int) -> int:
     return JOINTS - 90 * lod
 
 
+def channel_count(lod: int) -> int:
+    return CHANNELS >> lod
+
+
 def add_definition(dna: risorius.Dna) -> None:
     every_lod = [list(range(joint_count(lod))) for lod in range(LODS)]
     dna.gui_control_names = [f"CTRL_L_generated{i:03d}.ty" for i in range(GUI)]
     dna.raw_control_names = raw_names()
     dna.joint_names = joint_names()
-    channels = [f"head__shape{i:03d}" for i in range(CHANNELS)]
-    channels[1] = channels[0]
-    dna.blend_shape_channel_names = channels
+    dna.blend_shape_channel_names = channel_names()
     dna.animated_map_names = [f"head_wm{i // 27 + 1}.map{i:02d}" for i in range(MAPS)]
-    dna.mesh_names = [name for name, *_ in MESHES]
+    dna.mesh_names = [
+        f"{name}_lod{lod}_mesh" for lod in range(LODS) for name, *_ in MESHES[: MESHES_OF_LOD[lod]]
+    ]
     dna.lod_joint_mapping = every_lod
-    dna.lod_blend_shape_mapping = [list(range(CHANNELS >> lod)) for lod in range(LODS)]
+    dna.lod_blend_shape_mapping = [list(range(channel_count(lod))) for lod in range(LODS)]
     dna.lod_animated_map_mapping = [list(range(MAPS)) if lod < 4 else [] for lod in range(LODS)]
-    dna.lod_mesh_mapping = [list(range(len(MESHES) - lod)) for lod in range(LODS)]
+    ends = np.cumsum(MESHES_OF_LOD)
+    dna.lod_mesh_mapping = [list(range(a, b)) for a, b in pairwise([0, *ends.tolist()])]
 
 
 def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
@@ -117,12 +177,38 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
     points[4:6] = [(3.2, 153, 7), (-3.2, 153, 7)]
     offsets = points - points[parents]
     offsets[0] = points[0]
-    angles = random.uniform(-0.5, 0.5, (JOINTS, 3))
-    angles[:6] = 0
+    turns = euler_matrices(random.uniform(-0.5, 0.5, (JOINTS, 3)))
+    turns[:1] = turns[4:6] = np.eye(3)
+    # Along the neck x points up the bone and z to the character's right: about z it looks up.
+    turns[1:4] = np.array([[0, 0, -1], [1, 0, 0], [0, -1, 0]])
+    local, offsets = turns.copy(), points.copy()
+    for joint, parent in enumerate(parents.tolist()):
+        if joint != parent:
+            local[joint] = turns[parent].T @ turns[joint]
+            offsets[joint] = turns[parent].T @ (points[joint] - points[parent])
     dna.joint_parents = parents
     dna.neutral_joint_translations = offsets
-    dna.neutral_joint_rotations = angles
+    dna.neutral_joint_rotations = euler_angles(local)
     return points
+
+
+def euler_matrices(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
+    """float64[n, 3, 3]: turns about x, then y, then z."""
+    (sx, sy, sz), (cx, cy, cz) = np.sin(np.radians(degrees.T)), np.cos(np.radians(degrees.T))
+    rows = [
+        [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+        [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+        [-sy, sx * cy, cx * cy],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def euler_angles(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The inverse of euler_matrices: float64[n, 3] degrees."""
+    x = np.arctan2(turns[:, 2, 1], turns[:, 2, 2])
+    y = np.arcsin(np.clip(-turns[:, 2, 0], -1, 1))
+    z = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
+    return np.degrees(np.stack([x, y, z], axis=1))
 
 
 def surface(places: NDArray[np.float64], radii: Sequence[float], centre: Sequence[float]) -> Floats:
@@ -135,30 +221,66 @@ def surface(places: NDArray[np.float64], radii: Sequence[float], centre: Sequenc
 
 
 def add_behavior(dna: risorius.Dna, random: np.random.Generator) -> None:
-    inputs = RAW + CORRECTIVES
     driven = np.arange(RAW - RAW_ONLY)
     gui = driven % (GUI - IDLE_GUI)
     dna.gui_to_raw = conditionals(gui, driven)
     dna.psd_count = CORRECTIVES
-    sizes = random.integers(2, 5, CORRECTIVES)
-    dna.psds = risorius.Psds(
-        rows=np.repeat(np.arange(RAW, inputs), sizes),
-        columns=np.concatenate([np.sort(random.choice(RAW, n, replace=False)) for n in sizes]),
-        values=random.uniform(0.8, 1.6, int(sizes.sum())),
-    )
-    dna.joint_row_count, dna.joint_column_count = 9 * JOINTS, inputs
-    bounds = np.linspace(0, JOINTS, GROUPS + 1).astype(int)
+    dna.psds = correctives(random)
+    dna.joint_row_count, dna.joint_column_count = 9 * JOINTS, CONTROLS
+    bounds = np.linspace(4, JOINTS, GROUPS + 1).astype(
+        int
+    )  # the spine and the drivers are the host's
     dna.joint_groups = [joint_group(range(a, b), random) for a, b in pairwise(bounds)]
     channels = np.arange(CHANNELS)
     dna.blend_shape_channels = risorius.BlendShapeChannels(
-        lods=[CHANNELS >> lod for lod in range(LODS)],
-        input_indices=channels,
+        lods=[channel_count(lod) for lod in range(LODS)],
+        input_indices=np.where(channels < EXPRESSIONS, channels, RAW + channels - EXPRESSIONS),
         output_indices=channels,
     )
     dna.animated_maps = risorius.AnimatedMaps(
         lods=[MAPS if lod < 4 else 0 for lod in range(LODS)],
         conditionals=conditionals(np.arange(MAPS), np.arange(MAPS)),
     )
+    add_neck_solver(dna)
+
+
+def correctives(random: np.random.Generator) -> risorius.Psds:
+    """Products of 2 to 20 expressions, most of few; some have a pose of the neck as a factor."""
+    sizes = np.minimum(2 + random.geometric(0.45, CORRECTIVES) - 1, 20)
+    sizes[0] = 20
+    columns = [np.sort(random.choice(EXPRESSIONS, n, replace=False)) for n in sizes]
+    for corrective in range(CORRECTIVES - 3 * POSES, CORRECTIVES):
+        columns[corrective][-1] = RAW + CORRECTIVES + corrective % POSES
+    count = int(sizes.sum())
+    values = np.where(random.random(count) < 0.7, 1.0, random.uniform(1.0, 4.0, count))
+    return risorius.Psds(
+        rows=np.repeat(np.arange(RAW, RAW + CORRECTIVES), sizes),
+        columns=np.concatenate(columns),
+        values=values,
+    )
+
+
+def add_neck_solver(dna: risorius.Dna) -> None:
+    """Poses of neck and head, by quaternions; the twist axis is x."""
+    targets = np.zeros((POSES, len(DRIVERS), 4))
+    for row, (_name, axis, degrees) in zip(targets, NECK_POSES, strict=True):
+        half = np.radians(degrees) / 2
+        row[:, axis], row[:, 3] = np.sin(half), np.cos(half)
+    dna.rbf_behavior.lod_solver_mapping = [[0] for _ in range(LODS)]
+    dna.rbf_behavior.solvers = [
+        risorius.RbfSolver(
+            name="neck", raw_control_indices=range(EXPRESSIONS, RAW), pose_indices=range(POSES),
+            raw_control_values=targets.ravel(), radius=0.6, weight_threshold=0.001,
+            solver_type=1, distance_method=1, twist_axis=0,
+        )
+    ]  # fmt: skip
+    dna.rbf_behavior.poses = [risorius.RbfPose(name=name, scale=1) for name, *_ in NECK_POSES]
+    first = RAW + CORRECTIVES
+    dna.rbf_behavior_ext.pose_control_names = [f"neck_{name}" for name, *_ in NECK_POSES]
+    dna.rbf_behavior_ext.poses = [
+        risorius.RbfPoseControls(output_control_indices=[first + i], output_control_weights=[1.0])
+        for i in range(POSES)
+    ]
 
 
 def conditionals(inputs: Ints, outputs: Ints) -> risorius.Conditionals:
@@ -175,14 +297,17 @@ def conditionals(inputs: Ints, outputs: Ints) -> risorius.Conditionals:
 
 
 def joint_group(joints: range, random: np.random.Generator) -> risorius.JointGroup:
-    """Translations and rotations of some joints from 30 to 70 controls, half of them zero."""
-    columns = np.sort(random.choice(RAW + CORRECTIVES, random.integers(30, 71), replace=False))
-    rows = np.array([9 * j + k for j in joints for k in range(6)])
-    turns = rows % 9 >= 3
-    values = random.normal(0, 1, (len(rows), len(columns))) * np.where(turns, 0.4, 0.02)[:, None]
-    values[random.random(values.shape) < 0.5] = 0
+    """Translations and rotations of some joints; of each tenth joint the scale too."""
+    rows = np.array([9 * j + k for j in joints for k in range(9 if j % 10 == 0 else 6)])
+    wanted = FILLED * 9 * JOINTS * CONTROLS / (6.3 * JOINTS)
+    columns = np.sort(
+        random.choice(CONTROLS, int(wanted * random.uniform(0.6, 1.4)), replace=False)
+    )
+    columns = columns[(columns < EXPRESSIONS) | (columns >= RAW)]
+    size = np.array([0.02, 0.4, 0.01])[rows % 9 // 3]
+    values = random.normal(0, 1, (len(rows), len(columns))) * size[:, None]
     return risorius.JointGroup(
-        lods=[len(rows) * (LODS - lod) // LODS // 6 * 6 for lod in range(LODS)],
+        lods=[len(rows) * (LODS - lod) // LODS for lod in range(LODS)],
         input_indices=columns,
         output_indices=rows,
         values=values,
@@ -194,6 +319,7 @@ def make_mesh(
     shape: Shape,
     joints: Floats,
     make_targets: Callable[[Floats], list[risorius.BlendShapeTarget]],
+    influences: int,
 ) -> risorius.Mesh:
     _, (rows, columns), radii, centre = shape
     grid = np.stack(np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"), axis=-1)
@@ -205,7 +331,7 @@ def make_mesh(
     quads = np.stack([at[:-1], at[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
     normals = (points - np.float32(centre)) / np.square(np.float32(radii))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    near, weights = skin(points, joints)
+    near, weights = skin(points, joints, influences)
     return risorius.Mesh(
         positions=points,
         texture_coordinates=places[:, ::-1],
@@ -215,18 +341,18 @@ def make_mesh(
         layout_normals=np.arange(count),
         face_offsets=np.arange(len(quads) + 1) * 4,
         face_layouts=quads.ravel(),
-        maximum_influence_per_vertex=INFLUENCES,
-        skin_offsets=np.arange(count + 1) * INFLUENCES,
+        maximum_influence_per_vertex=influences,
+        skin_offsets=np.arange(count + 1) * influences,
         skin_weights=weights.ravel(),
         skin_joint_indices=near.ravel(),
         blend_shape_targets=make_targets(points),
     )
 
 
-def skin(points: Floats, joints: Floats) -> tuple[Ints, Floats]:
+def skin(points: Floats, joints: Floats, influences: int) -> tuple[Ints, Floats]:
     """The nearest joints of each vertex, weighted by closeness; weights sum to 1."""
     square = np.square(points).sum(1)[:, None] + np.square(joints).sum(1) - 2 * points @ joints.T
-    near = np.argpartition(square, INFLUENCES, axis=1)[:, :INFLUENCES]
+    near = np.argpartition(square, influences, axis=1)[:, :influences]
     weights = 1 / (np.maximum(np.take_along_axis(square, near, axis=1), 0) + 0.05)
     order = np.argsort(-weights, axis=1, kind="stable")
     near, weights = (np.take_along_axis(a, order, axis=1) for a in (near, weights))
@@ -234,12 +360,14 @@ def skin(points: Floats, joints: Floats) -> tuple[Ints, Floats]:
 
 
 def part_targets(
-    index: int, points: Floats, random: np.random.Generator
+    name: str, lod: int, points: Floats, random: np.random.Generator
 ) -> list[risorius.BlendShapeTarget]:
-    """Every channel on the head, 100 elsewhere."""
-    if index == 0:
-        return targets(range(CHANNELS), 800, points, random)
-    channels = sorted(random.choice(CHANNELS, 100, replace=False))
+    """Every channel of the LOD on the head, 100 elsewhere; only the two finest LODs have shapes."""
+    if lod > 1 or len(points) < 300:
+        return []
+    if name == "head":
+        return targets(range(channel_count(lod)), 800 >> lod, points, random)
+    channels = sorted(random.choice(channel_count(lod), 100, replace=False))
     return targets(channels, len(points) / 4, points, random)
 
 
@@ -273,13 +401,24 @@ def add_heads(
     def head(lod: int) -> risorius.Mesh:
         def shapes(points: Floats) -> list[risorius.BlendShapeTarget]:
             mean = deltas_per_channel * len(points) / (HEADS[0][1][0] * HEADS[0][1][1])
-            return targets(range(CHANNELS >> lod), mean, points, random)
+            return targets(range(channel_count(lod)), mean, points, random)
 
-        return make_mesh(HEADS[lod], joints[: joint_count(lod)], shapes)
+        return make_mesh(HEADS[lod], joints[: joint_count(lod)], shapes, INFLUENCES[lod])
 
-    dna.mesh_names = [name for name, *_ in HEADS]
+    dna.mesh_names = [f"head_lod{lod}_mesh" for lod in range(LODS)]
     dna.lod_mesh_mapping = [[lod] for lod in range(LODS)]
     dna.meshes = [head(lod) for lod in range(LODS)]
+
+
+def meshes_of(lod: int, joints: Floats, random: np.random.Generator) -> list[risorius.Mesh]:
+    """The meshes of a LOD, of half as many vertices as those of the LOD before."""
+    found = []
+    for name, (rows, columns), radii, centre in MESHES[: MESHES_OF_LOD[lod]]:
+        grid = (max(round(rows * 2 ** (-lod / 2)), 4), max(round(columns * 2 ** (-lod / 2)), 5))
+        shapes = partial(part_targets, name, lod, random=random)
+        near = joints[: joint_count(lod)]
+        found.append(make_mesh((name, grid, radii, centre), near, shapes, INFLUENCES[lod]))
+    return found
 
 
 def generate(seed: int = 1, deltas_per_channel: int | None = None) -> risorius.Dna:
@@ -295,10 +434,7 @@ def generate(seed: int = 1, deltas_per_channel: int | None = None) -> risorius.D
     joints = add_joints(dna, random)
     add_behavior(dna, random)
     if deltas_per_channel is None:
-        dna.meshes = [
-            make_mesh(shape, joints, partial(part_targets, i, random=random))
-            for i, shape in enumerate(MESHES)
-        ]
+        dna.meshes = [mesh for lod in range(LODS) for mesh in meshes_of(lod, joints, random)]
     else:
         add_heads(dna, joints, deltas_per_channel, random)
     pairs = [

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         risorius_reactions_index: int
         risorius_converge: float  # see gaze_settings, as the two below
         risorius_lids: float
+        risorius_neck_poses: bool
         risorius_body_turn: float
 
         @property

@@ -110,7 +110,9 @@ def import_file(
         _remove(made)
         runtime.forget_unused(parts.rigs())
         raise
-    return rig, [*dna.warnings, *warnings, *plans.layer_warnings(file.rig.ignored_layers)]
+    _turning, unfilled = native.part("rigs.joint_controls").joint_controls(dna)
+    late = plans.layer_warnings(file.rig.ignored_layers)
+    return rig, [*dna.warnings, *unfilled, *warnings, *late]
 
 
 def _build(

@@ -45,6 +45,16 @@ def _all() -> dict[str, object]:
             default=1.0,
             **shared,
         ),
+        "risorius_neck_poses": bpy.props.BoolProperty(
+            name="Head Drives Neck Poses",
+            description="Turns of head and neck fill the raw controls that hold the rotations of "
+            "these joints, and poses of the file repair neck and jaw. Off: the sliders of these "
+            "controls lead",
+            default=True,
+            override=_OVERRIDE,
+            update=_changed,
+            translation_context=tables.CONTEXT,
+        ),
     }
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ... import native
@@ -41,6 +42,7 @@ class Runtime:
         anchors: joints of neck, head and eyes.
         look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
         lids: the controls that close and widen an eye, by eyeBlink or eyeWiden and the side.
+        turning: the joints whose rotation raw controls hold.
         morphs: mesh index -> risorius.Morph.
         surfaces: level of detail -> risorius.Surface.
         chains: joint -> Chain.
@@ -57,6 +59,7 @@ class Runtime:
     anchors: plans.Anchors
     look: dict[str, list[tuple[int, float, float]]]
     lids: dict[str, int]
+    turning: list[Turning]
     morphs: dict[int, native.Morph] = field(default_factory=dict)
     surfaces: dict[int, native.Surface] = field(default_factory=dict)
     chains: dict[int, Chain] = field(default_factory=dict)
@@ -110,6 +113,27 @@ class Runtime:
             sequence=space.sequence,
             signs=space.signs,
         )
+
+
+@dataclass(frozen=True)
+class Turning:
+    """A joint whose rotation four raw controls hold.
+
+    Attributes:
+        joint: its index.
+        controls: indices of the raw controls of x, y, z and w.
+        bone: the control bone that turns the joint, "neck" or "head"; "" where none does.
+        share: of the control bone's turn that the joint takes.
+        armature_axes: takes the vector part of a rotation about the armature's axes to the file's.
+        bone_axes: the same for a rotation about the axes of the joint's bone.
+    """
+
+    joint: int
+    controls: tuple[int, int, int, int]
+    bone: str
+    share: float
+    armature_axes: Matrix
+    bone_axes: Matrix
 
 
 @dataclass
@@ -245,12 +269,32 @@ def _runtime(dna: native.Dna, rig: native.Rig, unit: float) -> Runtime:
         anchors=anchors,
         look={},
         lids={},
+        turning=_turning(dna, space, anchors),
     )
     runtime.look = _measure_look(runtime)
     lids = {f"{kind}{side}" for kind in ("eyeBlink", "eyeWiden") for side in "LR"}
     short = [name.rsplit(".", 1)[-1] for name in dna.raw_control_names]
     runtime.lids = {name: i for i, name in enumerate(short) if name in lids}
     return runtime
+
+
+def _turning(dna: native.Dna, space: Space, anchors: plans.Anchors) -> list[Turning]:
+    sign = 1.0 if np.linalg.det(space.axes) > 0.0 else -1.0
+    bone_axes = Matrix((sign * space.axes.T).tolist())
+    shares = {joint: ("neck", 1.0 / len(anchors.neck)) for joint in anchors.neck}
+    if anchors.head is not None:
+        shares[anchors.head] = ("head", 1.0)
+    found, _sentences = native.part("rigs.joint_controls").joint_controls(dna)
+    return [
+        Turning(
+            item.joint,
+            item.controls,
+            *shares.get(item.joint, ("", 0.0)),
+            Matrix(item.axes.tolist()),
+            bone_axes,
+        )
+        for item in found
+    ]
 
 
 def _measure_look(runtime: Runtime) -> dict[str, list[tuple[int, float, float]]]:

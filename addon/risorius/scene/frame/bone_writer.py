@@ -27,6 +27,7 @@ class Writer:
         space: risorius.BoneSpace of these, in the same order.
         turning: (name of the control bone, row in these, share of the turn, rest rotation).
         buffers: channel -> float32 for all bones; None where the evaluator owns every bone.
+        driving: joint -> position of its bone, of the joints whose rotation raw controls hold.
     """
 
     count: int
@@ -34,6 +35,7 @@ class Writer:
     space: native.BoneSpace
     turning: list[tuple[str, int, float, Quaternion]]
     buffers: dict[str, NDArray[np.float32]] | None
+    driving: dict[int, int]
 
 
 _WIDTHS = {"location": 3, "rotation_quaternion": 4, "scale": 3, "rotation_euler": 3}
@@ -151,4 +153,5 @@ def _make_writer(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
         space=live.bone_space([joints[i] for i in where]),
         turning=turning,
         buffers=buffers,
+        driving={t.joint: joints.index(t.joint) for t in live.turning if t.joint in joints},
     )

@@ -25,6 +25,7 @@ from . import (
     channel_preview,
     controls_ahead,
     inputs,
+    joint_turns,
     lateness,
     live_keys,
     look_masks,
@@ -131,13 +132,15 @@ def _glance(seen: ArmatureObject) -> tuple[object, ...]:
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
     place = np.array(seen.matrix_world).tobytes()
-    gaze = seen.risorius_converge, seen.risorius_lids, seen.risorius_body_turn
-    return tuple(bones[parts.FACE].values()), matrices.tobytes(), place, gaze
+    follow = seen.risorius_converge, seen.risorius_lids, seen.risorius_body_turn
+    shown = (*follow, seen.risorius_neck_poses)
+    return tuple(bones[parts.FACE].values()), matrices.tobytes(), place, shown
 
 
 def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
     """Whether its control armature alone moves a character. Args: seen  that, evaluated."""
     more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(seen.original)
+    more = more or joint_turns.reads_bones(rig)
     return not more and not rig_placement.body_of(seen.original) and parts.FACE in seen.pose.bones
 
 

@@ -15,7 +15,7 @@ from ..animation import layer_mixing
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import board, rig_placement, runtime
-from . import gaze
+from . import gaze, joint_turns
 
 Turns = dict[str, Quaternion]  # "neck", "head": in the armature's axes
 
@@ -82,7 +82,8 @@ def complete(
         live: the character's Runtime.
         depsgraph: the evaluated graph that has the body too.
         maximum: of the sliders.
-        raw: float32[R], the sliders with their layers; the look controls are changed in place.
+        raw: float32[R], the sliders with their layers; the look controls, and the controls that
+            hold rotations of joints, are changed in place.
         own: the turns of the character's own head and neck bones by name, None where they rest.
 
     Returns:
@@ -96,6 +97,7 @@ def complete(
         if turn is not None:
             turns[name] = turns[name] @ turn if name in turns else turn
     _add_look(seen, live, raw, maximum, turns)
+    joint_turns.fill(seen, live, depsgraph, raw, turns)
     return raw, turns
 
 

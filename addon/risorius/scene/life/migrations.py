@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..animation import actions
 from ..base import form, parts
 from ..base.blender_types import ArmatureObject
-from ..frame import caches
+from ..frame import caches, joint_turns
 
 _said: set[int] = set()  # session uids of characters that something was said of
 
@@ -101,4 +101,12 @@ def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
     return []
 
 
-_STEPS = (_to_1, _to_2)
+def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
+    """Head turns drive neck poses; sliders of the rotations that were set go on leading."""
+    if not joint_turns.are_set_by_hand(rig, controls):
+        return []
+    controls.risorius_neck_poses = False
+    return ["the sliders of its joints' rotations go on leading the neck poses"]
+
+
+_STEPS = (_to_1, _to_2, _to_3)

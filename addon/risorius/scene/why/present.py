@@ -72,8 +72,30 @@ def _known_of(live: runtime.Runtime) -> tuple[runtime.Runtime, native.ControlNam
         for row, column in pairs:
             factors.setdefault(row, []).append(column)
         names = native.part("controls.control_names").ControlNames(live.dna)
+        factors.update(_inputs_of_poses(live.dna, names.ml_end))
         kept = _known[id(live)] = (live, names, factors)
     return kept
+
+
+def _inputs_of_poses(dna: native.Dna, first: int) -> Factors:
+    """The output controls of the poses of solvers, each with the controls that its value hangs on.
+
+    Args:
+        dna: the file.
+        first: the index of the first output control of a pose.
+    """
+    found: Factors = {}
+    poses = dna.rbf_behavior_ext.poses
+    for solver in dna.rbf_behavior.solvers:
+        for pose in solver.pose_indices.tolist():
+            # Files of version 2.4 have an output control for each pose, and no list of them.
+            outputs, more = [first + pose], list[int]()
+            if pose < len(poses):
+                outputs = poses[pose].output_control_indices.tolist()
+                more = poses[pose].input_control_indices.tolist()
+            for output in outputs:
+                found.setdefault(output, []).extend([*solver.raw_control_indices.tolist(), *more])
+    return found
 
 
 def names_of(live: runtime.Runtime) -> native.ControlNames:
@@ -82,7 +104,7 @@ def names_of(live: runtime.Runtime) -> native.ControlNames:
 
 
 def factors_of(live: runtime.Runtime) -> Factors:
-    """Each corrective with the controls that it is the product of."""
+    """Each corrective with its factors, each output of a solver's pose with the solver's inputs."""
     return _known_of(live)[2]
 
 

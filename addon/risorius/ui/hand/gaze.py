@@ -8,7 +8,7 @@ import bpy
 from ...scene.animation import keying
 from ...scene.base import parts
 from ...scene.character import board, rig_placement, runtime
-from ...scene.frame import evaluate
+from ...scene.frame import evaluate, joint_turns
 from ...scene.hand import blinks, gaze_target
 from .. import words
 from ..blender_types import Context, Operator, Panel, Result
@@ -155,6 +155,8 @@ class RISORIUS_PT_gaze(FaceOnlyPanel, Panel):
         column.prop(controls, "risorius_lids", slider=True)
         if rig_placement.body_of(controls) is not None:
             layout.prop(controls, "risorius_body_turn", slider=True)
+        if joint_turns.has_any(face_rig(context)):
+            layout.prop(controls, "risorius_neck_poses")
 
 
 CLASSES = (RISORIUS_OT_gaze_target, RISORIUS_OT_blink, RISORIUS_PT_gaze)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 import risorius
 from risorius.base.errors import ArgumentError
 from risorius.controls.control_names import ControlNames
+from risorius.rigs.joint_controls import JointControl, head_turns, joint_controls
 
 Floats = npt.NDArray[np.float32]
 PARTS = ("joints", "shapes", "maps", "controls")
@@ -24,7 +25,9 @@ FIELDS = {
     "controls": "controls",
 }
 """What users call the parts of a Pose -> its fields."""
-_LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior")
+_LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior", "twist_swing_behavior")
+HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll")
+"""Curves of a clip by which a head turns, radians."""
 _CHUNK_BYTES = 8 << 20  # poses that stay in a processor's cache are several times as fast to use
 
 
@@ -40,6 +43,8 @@ class Face:
     rotation_unit: str
     psd_range: tuple[int, int]
     """Of the correctives among the controls: first, end."""
+    turning: tuple[JointControl, ...] = ()
+    """Joints whose rotation raw controls hold."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -85,7 +90,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
         "controls": _each_once(controls.names, rig.control_count, "control"),
     }
     psds = (controls.psd_begin, controls.psd_end)
-    return Face(path.stem, rig, names, dna.translation_unit, dna.rotation_unit, psds)
+    turning = tuple(joint_controls(dna)[0])
+    return Face(path.stem, rig, names, dna.translation_unit, dna.rotation_unit, psds, turning)
 
 
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
@@ -101,12 +107,16 @@ def _each_once(names: list[str], count: int, kind: str) -> list[str]:
 
 
 def prepared(
-    clip: risorius.Clip, rate: float | None, frames: tuple[int | None, int | None]
+    clip: risorius.Clip,
+    face: Face,
+    rate: float | None = None,
+    frames: tuple[int | None, int | None] = (None, None),
 ) -> risorius.Clip:
-    """The frames of a clip that are asked for.
+    """The frames of a clip that are asked for, for a face that turns its head.
 
     Args:
         clip: any.
+        face: on which it plays, see with_head_turns.
         rate: frames per second to resample it to; None leaves it as it is.
         frames: first and end (not included), counted from 0 after resampling; what lies beyond the
             clip's end is not there.
@@ -127,7 +137,31 @@ def prepared(
         )
     if not clip.frame_count:
         raise ArgumentError(f"a clip with frames was expected, found {found}, of them 0 asked for")
-    return clip
+    return with_head_turns(clip, face)
+
+
+def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
+    """A clip whose head also turns the raw controls that hold the rotation of the head's joint.
+
+    Args:
+        clip: with or without curves of HEAD_ANGLES. Curves of these raw controls that it has stay.
+        face: on which it plays.
+
+    Returns:
+        The clip with up to four curves more.
+    """
+    angles = [name for name in HEAD_ANGLES if name in clip]
+    head = next((t for t in face.turning if t.name.lower() == "head"), None)
+    if head is None or not angles:
+        return clip
+    raw = face.rig.raw_control_names
+    names = [raw[control] for control in head.controls]
+    if any(name in clip for name in names):
+        return clip
+    nothing = np.zeros(clip.frame_count, np.float32)
+    rows = [clip.curve(name) if name in clip else nothing for name in HEAD_ANGLES]
+    curves = head.values(head_turns(np.stack(rows, axis=1))).T.astype(np.float32)
+    return clip.replaced(names=[*clip.names, *names], curves=np.concatenate([clip.curves, curves]))
 
 
 class Chunk(NamedTuple):

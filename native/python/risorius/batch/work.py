@@ -128,7 +128,7 @@ def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
         started = time.perf_counter()
         made_from = stamp(job)
         face, performance = _face(job), _performance(job)
-        clip = prepared(performance.clip, job.options.rate, job.options.frames)
+        clip = prepared(performance.clip, face, job.options.rate, job.options.frames)
         loaded = time.perf_counter()
         facts = bake(
             clip, face, job.lod, dict(job.outputs), parts=job.options.parts,

@@ -11,6 +11,7 @@ import risorius
 
 from ..base.words import counted
 from ..mixing import difference
+from ..rigs.joint_controls import joint_controls
 from .files import InputError, from_json, summary
 
 _DESCRIPTION = """\
@@ -51,7 +52,7 @@ def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
     for text in dna.validate():
         where, _, message = text.partition(": ")
         found.append(risorius.Finding(False, "invalid_value", where, None, message))
-    return dna, found
+    return dna, found + _joint_controls(dna)
 
 
 def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
@@ -60,9 +61,19 @@ def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
         found = risorius.check(name)
         if any(finding.is_error for finding in found):
             return None, found
-        return risorius.load(name, layers="definition"), found
+        dna = risorius.load(name, layers=("rbf_behavior", "twist_swing_behavior"))
+        return dna, found + _joint_controls(dna)
     except risorius.DnaError as error:
         return None, [_error(name, error)]
+
+
+def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
+    """Warnings on raw controls that hold rotations of joints, and that nothing can fill."""
+    where = "definition.raw_control_names"
+    return [
+        risorius.Finding(False, "invalid_value", where, None, text)
+        for text in joint_controls(dna)[1]
+    ]
 
 
 def examine(name: str, strict: bool) -> dict[str, Any]:

@@ -155,7 +155,7 @@ def run(args: argparse.Namespace) -> int:
     require_writable(out, parents=True)
     face = load_face(Path(args.controls[0]), quaternions=args.quaternions)
     performance = load_performance(args.file, face, args.mapping)
-    clip = prepared(performance.clip, rate, frames)
+    clip = prepared(performance.clip, face, rate, frames)
     try:
         face.check_lod(args.lod)
     except ArgumentError as error:

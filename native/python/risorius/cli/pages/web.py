@@ -9,7 +9,7 @@ from pathlib import Path
 import risorius
 
 from ...baking.clips import load_performance
-from ...baking.face import load_face
+from ...baking.face import load_face, prepared
 from ...base.given import GivenError, shown, whole_text
 from ...files import fileio
 from ...web import find_pictures, render
@@ -69,7 +69,9 @@ def run(args: argparse.Namespace) -> int:
     dna = risorius.load(args.file, lods=lods)
     clip = None
     if args.clip is not None:
-        clip = load_performance(args.clip, load_face(args.file)).clip
+        face = load_face(args.file)
+        clip = load_performance(args.clip, face).clip
+        clip = prepared(clip, face, None if clip.times is None else clip.rate)
     sound = None
     if args.sound is not None:
         sound = (read_bytes(str(args.sound)), args.sound.suffix, 0.0)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The raw controls that hold rotations of joints: filled before the face is evaluated.
+
+RBF poses of the file read them and repair neck and jaw when the head turns. The control bones,
+layers, live capture and a body turn head and neck, which is known before the frame. Where something
+else turns a joint, such as a constraint on its bone, Blender has to evaluate the bone first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from mathutils import Quaternion, Vector
+from numpy.typing import NDArray
+
+from ..base import drivers, parts
+from ..base.blender_types import ArmatureObject, Depsgraph
+from ..character import runtime
+from . import bone_writer
+
+_NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
+
+
+def has_any(rig: ArmatureObject) -> bool:
+    """Whether raw controls of a character hold rotations of joints. Args: rig  its armature."""
+    live = runtime.of(rig)
+    return live is not None and bool(live.turning)
+
+
+def are_set_by_hand(rig: ArmatureObject, controls: ArmatureObject) -> bool:
+    """Whether a slider of such a raw control has a key, a driver or a value that is not its rest.
+
+    Args:
+        rig, controls: armatures of a character.
+    """
+    live = runtime.of(rig)
+    if live is None or parts.FACE not in controls.pose.bones:
+        return False
+    values = controls.pose.bones[parts.FACE]
+    indices = [index for item in live.turning for index in item.controls]
+    labels = [live.labels[index] for index in indices]
+    moved = any(values.get(live.labels[i], live.rests[i]) != live.rests[i] for i in indices)
+    return moved or bool(labels and drivers.used_controls(controls, labels))
+
+
+def reads_bones(rig: ArmatureObject) -> bool:
+    """Whether these rotations are read from the evaluated bones.
+
+    Args:
+        rig: deforming armature.
+    """
+    live = runtime.of(rig)
+    if live is None or not live.turning:
+        return False
+    if drivers.moves(rig) or not all(item.bone for item in live.turning):
+        return True
+    driving, bones = bone_writer.writer_of(rig, live).driving, rig.pose.bones
+    return any(bones[place].constraints for place in driving.values())
+
+
+def fill(
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    depsgraph: Depsgraph,
+    raw: NDArray[np.float32],
+    turns: Mapping[str, Quaternion],
+) -> None:
+    """Set the raw controls that hold rotations of joints, in place.
+
+    Args:
+        seen: the evaluated control armature.
+        live: the character's Runtime.
+        depsgraph: where the bones of the deforming armature are read, if they are.
+        raw: float32[R], the raw controls.
+        turns: "neck" and "head" -> Quaternion in the armature's axes, without straight ones.
+    """
+    if not live.turning or not seen.risorius_neck_poses:
+        return
+    rig = parts.rig_of(seen.original)
+    found: dict[int, Quaternion] = {}
+    if rig is not None and reads_bones(rig):
+        found = _bones(rig, live, depsgraph)
+    for item in live.turning:
+        if item.joint in found:
+            turn, axes = found[item.joint], item.bone_axes
+        else:
+            turn, axes = _share(turns.get(item.bone), item.share), item.armature_axes
+        x, y, z = axes @ Vector((turn.x, turn.y, turn.z))
+        raw[list(item.controls)] = _one_sign((x, y, z, turn.w))
+
+
+def _share(turn: Quaternion | None, share: float) -> Quaternion:
+    if turn is None:
+        return Quaternion()
+    return Quaternion().slerp(turn, share) if share < 1.0 else turn
+
+
+def _bones(
+    rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph
+) -> dict[int, Quaternion]:
+    """Joint -> the rotation of its evaluated bone against its rest, about the bone's axes."""
+    seen = rig.evaluated_get(depsgraph)
+    if not seen.is_evaluated:
+        return {}
+    found = {}
+    for joint, place in bone_writer.writer_of(rig, live).driving.items():
+        bone = seen.pose.bones[place]
+        local = seen.convert_space(
+            pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+        )
+        found[joint] = local.to_quaternion().normalized()
+    return found
+
+
+def _one_sign(turn: tuple[float, float, float, float]) -> tuple[float, ...]:
+    """Of q and -q the one whose last part other than 0 is positive."""
+    last = next((part for part in reversed(turn) if abs(part) > _NOTHING), 1.0)
+    return tuple(-part for part in turn) if last < 0.0 else turn

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Raw controls that hold rotations of joints: whatever turns head and neck fills them."""
+
+import bpy
+import numpy as np
+import pytest
+import risorius
+from mathutils import Euler, Matrix, Quaternion
+from support import oracle, scene
+from support.faces import HEAD, NECK_POSES, SIDE, TURNING, UP, neck_face
+
+NECK = 1
+NEAR = 4e-3  # the arc between two float32 quaternions that are one is off by a thousandth
+
+
+@pytest.fixture
+def face(tmp_path):
+    """Imports a face with neck poses: its rig, its Dna."""
+
+    def make(**options):
+        path = tmp_path / "neck.dna"
+        dna = neck_face(**options)
+        dna.save(str(path))
+        return scene.load(path), dna
+
+    return make
+
+
+def _axes(dna):
+    return np.array([oracle._AXES[word] for word in dna.coordinate_system], np.float64).T
+
+
+def _rest(dna, joint):
+    """The resting axes of a joint in the file's space."""
+    return oracle._world(dna, np.zeros((len(dna.joint_names), 9)))[joint][:3, :3]
+
+
+def _armature_turn(dna, joint, local):
+    """The turn about the armature's axes that a joint's own rotation (x, y, z, w) is."""
+    x, y, z, w = local
+    turn = np.array(Quaternion((w, x, y, z)).to_matrix(), np.float64)
+    basis = _axes(dna) @ _rest(dna, joint)
+    return Matrix((basis @ turn @ basis.T).tolist()).to_quaternion()
+
+
+def _own_turn(dna, joint, turn):
+    """The inverse: x, y, z, w about the joint's axes, w not below 0."""
+    basis = _axes(dna) @ _rest(dna, joint)
+    local = basis.T @ np.array(turn.to_matrix(), np.float64) @ basis
+    w, x, y, z = Matrix(local.tolist()).to_quaternion()
+    return np.array([x, y, z, w]) * (-1 if w < 0 else 1)
+
+
+def _pose(rig, bone, turn):
+    """Turn a control bone by a rotation about the armature's axes."""
+    item = scene.controls(rig).pose.bones[bone]
+    rest = item.bone.matrix_local.to_quaternion()
+    item.rotation_mode = "QUATERNION"
+    item.rotation_quaternion = rest.inverted() @ turn @ rest
+
+
+def _wanted(dna, neck=None, head=None, **sliders):
+    """Channels as the evaluator gives them for these turns about the armature's axes."""
+    rig = risorius.Rig(dna)
+    raw = rig.initial_raw_controls.copy()
+    names = list(rig.raw_control_names)
+    for end, value in sliders.items():
+        raw[names.index(f"CTRL_expressions.{end}")] = value
+    for joint, turn in ((NECK, neck), (HEAD, head)):
+        first = names.index(f"{dna.joint_names[joint]}.qx")
+        if turn is not None:
+            raw[first : first + 4] = _own_turn(dna, joint, turn)
+    return rig.evaluate(raw).blend_shapes
+
+
+def _shown(rig):
+    return np.array(rig["channels"][:])
+
+
+CONVENTIONS = (
+    {},
+    {"rotation_sequence": "zyx", "rotation_unit": "radians", "translation_unit": "m"},
+    {"axes": ("left", "front", "up"), "rotation_sequence": "yxz", "rotation_signs": (1, -1, 1)},
+    {"axes": ("right", "front", "up")},
+)
+
+
+@pytest.mark.parametrize("options", CONVENTIONS, ids=["usual", "zyx radians", "signs", "mirrored"])
+def test_control_bones_fire_the_files_neck_poses(face, options):
+    rig, dna = face(**options)
+    assert _shown(rig)[4:] == pytest.approx([0, 0], abs=1e-6)
+    for pose, channel in ((UP, 4), (SIDE, 5)):
+        for bone, joint, part in (("neck", NECK, slice(0, 4)), ("head", HEAD, slice(4, 8))):
+            _pose(rig, bone, _armature_turn(dna, joint, NECK_POSES[pose][part]))
+        scene.set_controls(rig, jawOpen=0.5)
+        shown = _shown(rig)
+        assert shown[channel] == pytest.approx(1.0, abs=NEAR)
+        assert shown[9 - channel] == pytest.approx(0.0, abs=1e-4)
+        assert shown[2] == pytest.approx(0.5 if pose == UP else 0.0, abs=NEAR)
+
+
+def test_any_turn_gives_what_the_evaluator_gives_for_it(face):
+    rig, dna = face()
+    random = np.random.default_rng(3)
+    for _ in range(6):
+        turns = [Euler(random.uniform(-0.5, 0.5, 3)).to_quaternion() for _ in range(2)]
+        _pose(rig, "neck", turns[0])
+        _pose(rig, "head", -turns[1])  # q and -q are one rotation
+        scene.set_controls(rig, jawOpen=0.3)
+        wanted = _wanted(dna, *turns, jawOpen=0.3)
+        np.testing.assert_allclose(_shown(rig), wanted, atol=1e-5)
+    half = Quaternion((0.0, 0.0, 1.0), np.pi)
+    for turn in (half, -half):
+        _pose(rig, "head", turn)
+        scene.update(scene.controls(rig))
+        np.testing.assert_allclose(
+            _shown(rig), _wanted(dna, turns[0], half, jawOpen=0.3), atol=1e-4
+        )
+
+
+def test_layers_frames_and_renders_have_them_in_time(face, tmp_path):
+    rig, dna = face()
+    clip = risorius.Clip(["head.pitch", "head.yaw"], [[0, 0.4, 0.4], [0, 0, 0.2]], 24.0)
+    clip.save(tmp_path / "nod.rzc")
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert bpy.ops.risorius.import_animation(filepath=str(tmp_path / "nod.rzc"), start=1) == {
+        "FINISHED"
+    }
+    seen = {}
+
+    def look(_scene, depsgraph):
+        seen["pre"] = np.array(rig.evaluated_get(depsgraph)["channels"][:])
+
+    bpy.app.handlers.frame_change_post.insert(0, look)  # before ours: what the frame itself had
+    try:
+        for frame in (2, 3, 1):
+            bpy.context.scene.frame_set(frame)
+            bone = scene.controls(rig).pose.bones["head"]
+            rest = bone.bone.matrix_local.to_quaternion()
+            turn = rest @ bone.matrix_basis.to_quaternion() @ rest.inverted()
+            wanted = _wanted(dna, head=turn)
+            np.testing.assert_allclose(_shown(rig), wanted, atol=1e-5)
+            np.testing.assert_allclose(seen["pre"], wanted, atol=1e-5)
+    finally:
+        bpy.app.handlers.frame_change_post.remove(look)
+    assert abs(_wanted(dna)[4] - wanted[4]) < 1e-6  # frame 1 rests
+    bpy.context.scene.frame_set(2)
+    assert _shown(rig)[4:].max() > 0.01
+
+
+def test_a_constraint_on_a_joints_bone_fires_them(face):
+    rig, dna = face()
+    bone = rig.pose.bones["head"]
+    hold = bone.constraints.new("LIMIT_ROTATION")
+    hold.owner_space = "LOCAL"
+    hold.use_limit_x = True
+    hold.min_x = hold.max_x = np.radians(30)
+    for _ in range(2):  # known once Blender has evaluated the bone
+        scene.update(rig, scene.controls(rig))
+    local = Quaternion((1.0, 0.0, 0.0), np.radians(30))
+    basis = np.array(rig.data.bones["head"].matrix_local.to_3x3(), np.float64)
+    turn = Matrix((basis @ np.array(local.to_matrix()) @ basis.T).tolist()).to_quaternion()
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, head=turn), atol=1e-4)
+
+
+def test_hand_keyed_values_lead_when_the_user_says_so(face):
+    rig, _dna = face()
+    _pose(rig, "head", Quaternion((1.0, 0.0, 0.0), 0.4))
+    bone = scene.face(rig)
+    for name, value in zip(TURNING, NECK_POSES[SIDE], strict=True):
+        bone[name] = float(value)
+    scene.update(scene.controls(rig))
+    assert _shown(rig)[5] < 0.5
+    scene.controls(rig).risorius_neck_poses = False
+    scene.update(scene.controls(rig))
+    assert _shown(rig)[5] == pytest.approx(1.0, abs=NEAR)
+
+
+@pytest.mark.parametrize("keyed", [False, True], ids=["at rest", "keyed"])
+def test_in_an_older_file_sliders_that_were_keyed_go_on_leading(face, keyed):
+    rig, _dna = face()
+    controls = scene.controls(rig)
+    if keyed:
+        scene.face(rig).keyframe_insert('["head.qx"]', frame=1)
+    form = scene.submodule("scene.base.form")
+    controls[form.VERSION] = 2
+    said = scene.submodule("scene.life.migrations").bring_up_all()
+    assert controls.risorius_neck_poses is not keyed
+    assert bool(said) is keyed
+
+
+def test_a_scaled_turned_parent_changes_nothing_and_two_faces_keep_apart(face):
+    rig, dna = face()
+    turn = Euler((0.3, -0.1, 0.2)).to_quaternion()
+    _pose(rig, "head", turn)
+    parent = bpy.data.objects.new("parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    parent.scale, parent.rotation_euler = (-2.0, 2.0, 2.0), (0.4, 1.0, 0.2)
+    scene.controls(rig).parent = parent
+    other, _ = face(name="Other")
+    scene.update(scene.controls(rig), scene.controls(other), parent)
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, head=turn), atol=1e-5)
+    np.testing.assert_allclose(_shown(other), _wanted(dna), atol=1e-6)
+
+
+def test_see_why_names_neck_poses_and_solo_shows_them_alone(face):
+    rig, dna = face()
+    for bone, joint, part in (("neck", NECK, slice(0, 4)), ("head", HEAD, slice(4, 8))):
+        _pose(rig, bone, _armature_turn(dna, joint, NECK_POSES[UP][part]))
+    scene.set_controls(rig, jawOpen=0.5)
+    causes = scene.submodule("scene.why.causes")
+    firing = {cause.name: cause for cause in causes.strongest(rig)}
+    assert firing["neck_up"].value == pytest.approx(1.0, abs=NEAR)
+    assert firing["neck_up"].now > 0.1
+    assert "neck_side" not in firing
+    alone = causes.sliders_of(rig, firing["neck_up"].control)
+    assert set(alone) == set(TURNING)
+    corrective = firing["pull_r"]  # named by its channel
+    assert set(causes.sliders_of(rig, corrective.control)) == {*TURNING, "CTRL_expressions.jawOpen"}
+    scene.submodule("scene.frame.look_masks").solo(rig, alone)
+    scene.update(scene.controls(rig))
+    shown = _shown(rig)
+    assert shown[4] == pytest.approx(1.0, abs=NEAR)
+    assert shown[[0, 1, 2]] == pytest.approx([0, 0, 0], abs=1e-6)
+
+
+def test_a_bake_has_what_the_frames_had(face):
+    rig, _dna = face()
+    controls = scene.controls(rig)
+    bone = controls.pose.bones["head"]
+    bone.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (5, 0.5)):
+        bone.rotation_euler = (angle, 0.1, 0.0)
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 5
+    live = {}
+    for frame in (1, 3, 5):
+        bpy.context.scene.frame_set(frame)
+        live[frame] = scene.snapshot(rig)
+    bpy.context.view_layer.objects.active = controls
+    assert bpy.ops.risorius.bake() == {"FINISHED"}
+    for frame, wanted in live.items():
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_allclose(scene.snapshot(rig), wanted, atol=2e-5)

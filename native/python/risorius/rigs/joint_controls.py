@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""Raw controls that hold the rotation of a joint.
+
+A MetaHuman head has twelve: `neck_01`, `neck_02` and `head`, each with `.qx .qy .qz .qw`. Its RBF
+poses, which repair neck and jaw when the head turns, read them. The evaluator neither turns these
+joints nor fills these controls. The host turns the joints and fills the controls before it
+evaluates (EpicGames/MetaHuman-DNA-Calibration, issue 51). Four controls hold the rotation of their
+joint against the neutral pose, about the joint's own axes, in the file's coordinate system.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .._native import Dna
+from .rotation import Convention, Doubles, product
+
+PARTS = ("x", "y", "z", "w")
+_NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
+# In a face's own axes: x to its left, y to its back, z up.
+_FACE_AXES = {
+    "right": (1.0, 0.0, 0.0),
+    "left": (-1.0, 0.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "down": (0.0, 0.0, -1.0),
+    "front": (0.0, -1.0, 0.0),
+    "back": (0.0, 1.0, 0.0),
+}
+
+
+@dataclass(frozen=True)
+class JointControl:
+    """The four raw controls of one joint.
+
+    Attributes:
+        joint: its index; name: its name in the file.
+        controls: indices of the raw controls of x, y, z and w.
+        axes: float64[3, 3]; takes the vector part of a rotation about the face's axes (x to the
+            face's left, y to its back, z up) to that of the same rotation about the joint's axes.
+    """
+
+    joint: int
+    name: str
+    controls: tuple[int, int, int, int]
+    axes: Doubles
+
+    def values(self, turns: npt.ArrayLike) -> Doubles:
+        """The values of the four controls.
+
+        Args:
+            turns: [..., 4], x, y, z, w of unit quaternions about the face's axes: the rotation of
+                the joint against its neutral pose.
+
+        Returns:
+            float64[..., 4], see one_sign.
+        """
+        given = np.asarray(turns, np.float64)
+        return one_sign(np.concatenate([given[..., :3] @ self.axes.T, given[..., 3:]], axis=-1))
+
+
+def one_sign(turns: Doubles) -> Doubles:
+    """Of q and -q, which are one rotation, the one whose last part other than 0 is positive.
+
+    RBF solvers with Euclidean distances tell q from -q.
+
+    Args:
+        turns: float64[..., 4].
+    """
+    there = np.abs(turns) > _NOTHING
+    last = 3 - np.argmax(there[..., ::-1], axis=-1)
+    leading = np.take_along_axis(turns, last[..., None], axis=-1)
+    return np.where(leading < 0.0, -turns, turns)
+
+
+def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
+    """Find the raw controls that hold rotations of joints.
+
+    Args:
+        dna: with definition and behavior.
+
+    Returns:
+        A JointControl for each joint that has all four controls, in the order of the controls; and
+        a sentence for each rotation that a solver reads and that lacks a control or a joint, or
+        has a control twice.
+    """
+    read = _read_by_solvers(dna)
+    named: dict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
+    for index, name in enumerate(dna.raw_control_names):
+        stem, dot, end = name.rpartition(".")
+        part = end[1:] if len(end) == 2 and end[0] == "q" else end
+        if dot and part in PARTS and (end != part or index in read):
+            named[stem][part].append(index)
+    where: dict[str, int] = {}
+    for joint, name in enumerate(dna.joint_names):
+        where.setdefault(name, joint)
+    found, said = list[JointControl](), list[str]()
+    for stem, by_part in named.items():
+        wrong = _what_is_wrong(stem, by_part, where)
+        if wrong and any(index in read for indices in by_part.values() for index in indices):
+            said.append(wrong)
+        if stem in where and len(by_part) == len(PARTS):
+            x, y, z, w = (by_part[part][0] for part in PARTS)
+            joint = where[stem]
+            found.append(JointControl(joint, stem, (x, y, z, w), _axes(dna, joint)))
+    return found, said
+
+
+def _what_is_wrong(stem: str, by_part: dict[str, list[int]], where: dict[str, int]) -> str:
+    """A sentence on raw controls that cannot all be filled; empty where they can.
+
+    Args:
+        stem: their name before the dot.
+        by_part: "x", "y", "z", "w" -> indices of the controls.
+        where: joints by their names.
+    """
+    missing = ", ".join(part for part in PARTS if part not in by_part)
+    kept = "the controls stay as they are set"
+    if missing:
+        return f"the rotation of {stem!r} has no raw control for {missing}: {kept}"
+    if stem not in where:
+        return f"raw controls hold the rotation of {stem!r}, and no joint has that name: {kept}"
+    if any(len(indices) > 1 for indices in by_part.values()):
+        return f"{stem!r} has two raw controls for one part of its rotation: the first counts"
+    return ""
+
+
+def _read_by_solvers(dna: Dna) -> set[int]:
+    """Raw controls that RBF solvers, twists and swings read as quaternions."""
+    behavior = dna.twist_swing_behavior
+    read = [solver.raw_control_indices for solver in dna.rbf_behavior.solvers]
+    read += [setup.input_control_indices for setup in (*behavior.twists, *behavior.swings)]
+    return {int(i) for indices in read for i in indices}
+
+
+def _axes(dna: Dna, joint: int) -> Doubles:
+    convention, parents = Convention.of(dna), dna.joint_parents
+    chain = [joint]
+    while int(parents[chain[-1]]) != chain[-1] and len(chain) <= len(parents):
+        chain.append(int(parents[chain[-1]]))
+    rest = np.array([0.0, 0.0, 0.0, 1.0])
+    for link in reversed(chain):
+        rest = product(rest, convention.quaternion(dna.neutral_joint_rotations[link]))
+    known = all(word in _FACE_AXES for word in dna.coordinate_system)
+    words = dna.coordinate_system if known else ("right", "up", "front")
+    face = np.array([_FACE_AXES[word] for word in words]).T  # file -> face
+    sign = -1.0 if np.linalg.det(face) < 0.0 else 1.0
+    return sign * matrix(rest).T @ face.T
+
+
+def matrix(q: Doubles) -> Doubles:
+    """float64[3, 3] of a unit quaternion (x, y, z, w), for column vectors."""
+    x, y, z, w = q
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
+
+
+def head_turns(angles: npt.NDArray[Any]) -> Doubles:
+    """Rotations of a head from a clip's angles.
+
+    Args:
+        angles: [n, 3] radians: yaw to the face's own left, pitch up, roll towards its own left
+            shoulder; in this order, each about the axes that the one before it turned.
+
+    Returns:
+        float64[n, 4], x, y, z, w about the face's axes (see JointControl.axes).
+    """
+    half = np.asarray(angles, np.float64) / 2.0
+    (sy, sp, sr), (cy, cp, cr) = np.sin(half.T), np.cos(half.T)
+    # The product of yaw about z, pitch about -x and roll about y.
+    return np.stack(
+        [
+            -cp * sr * sy - cr * cy * sp,
+            cp * cy * sr - cr * sp * sy,
+            cp * cr * sy - cy * sp * sr,
+            cp * cr * cy + sp * sr * sy,
+        ],
+        axis=1,
+    )
