@@ -54,7 +54,7 @@ def test_caches_of_older_files_are_told_until_they_are_baked_again(old, dna_file
     assert not _told(rig)
     rig = _reopened(tmp_path / "again.blend")
     assert not _told(rig)
-    assert scene.controls(rig)[VERSION] == 2
+    assert scene.controls(rig)[VERSION] == 3
 
 
 def test_each_frame_in_a_process_of_its_own(dna_file, tmp_path):

@@ -2,11 +2,16 @@
 """Paths that begin with two slashes, as Blender writes them, in each operator that takes a file."""
 
 import bpy
+import numpy as np
 import pytest
 import risorius
 from support import scene
 
 JAW = "CTRL_expressions.jawOpen"
+RANGE = f"""format = "risorius range 1"
+[controls]
+"{JAW}" = {{ neutral = 0.1, extreme = 0.9 }}
+"""
 
 
 def _library(folder, name):
@@ -20,6 +25,9 @@ def _library(folder, name):
 def _calls(folder):
     """Operator -> calls with `//`, each with the file in the folder that it must have made."""
     risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
+    opened = 0.8 * (np.arange(240) % 60 < 20)
+    risorius.Clip([JAW], [opened], 60.0).save(folder / "opens.rzc")
+    (folder / "given.toml").write_text(RANGE, encoding="utf-8")
     _library(folder / "bad", "grin")
     one = {"filepath": "//small.dna"}
     many = {"directory": "//", "files": [{"name": "small.dna"}]}
@@ -36,6 +44,9 @@ def _calls(folder):
         "export_web": [({"filepath": "//page.html", "use_animation": False}, "page.html")],
         "import_dna": [(one, ""), (many, "")],
         "make_rig": [({"filepath": "//rig.dna", "joints": 2, "levels": 1}, "rig.dna")],
+        "learn_range": [({"filepath": "//opens.rzc"}, "")],
+        "load_range": [({"filepath": "//given.toml"}, "")],
+        "save_range": [({"filepath": "//saved.toml"}, "saved.toml")],
         "speak": {"filepath": "//voice.wav"},
     }
 

@@ -274,7 +274,7 @@ def test_facts(tmp_path, capsys):
         (["-o", "out.npz", "more.dna"], "CLIP DNA"),
         (["--rate", "30"], "-o is missing"),
         ([], "-o OUT.npz"),
-        (["-o", "clip.csv"], "INPUT itself"),
+        (["-o", "clip.csv"], "the input itself"),
     ],
 )
 def test_bad_command_line_is_exit_code_2(tmp_path, monkeypatch, capsys, arguments, message):

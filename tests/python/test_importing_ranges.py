@@ -122,7 +122,7 @@ def test_a_face_is_not_evaluated_with_another_scale(tmp_path, capsys):
 
 def test_options_that_make_no_sense(tmp_path, capsys):
     assert convert(tmp_path, "take.csv", table(SOME), "--full-value", "-1")[0] == 2
-    assert "--full-value: above 0 was expected, found -1" in capsys.readouterr().err
+    assert "--full-value: more than 0 was expected, found '-1'" in capsys.readouterr().err
     for options in ({"full_value": float("nan")}, {"angles": "turns"}):
         with pytest.raises(ValueError, match="was expected, found"):
             importing.import_file(tmp_path / "take.csv", **options)

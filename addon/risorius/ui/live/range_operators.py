@@ -14,7 +14,7 @@ from ...scene.animation import range_properties
 from ...scene.character import runtime
 from ...scene.live import range_learning, sessions
 from ..blender_types import Context, ExportHelper, ImportHelper, Operator, Result
-from ..common import FaceOperator, active_controls, explain, face_controls, face_rig
+from ..common import FaceOperator, active_controls, explain, face_controls, face_rig, system_path
 from ..words import of_error, say
 
 
@@ -70,7 +70,7 @@ class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
     )
 
     def execute(self, context: Context) -> Result:
-        path = bpy.path.abspath(self.filepath)
+        path = system_path(self.filepath)
         try:
             self.keep(context, self._clip(context, path), self.performance)
         except native.user_errors() as error:
@@ -130,7 +130,7 @@ class RISORIUS_OT_load_range(FaceOperator, Operator, ImportHelper):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
     def execute(self, context: Context) -> Result:
-        path = bpy.path.abspath(self.filepath)
+        path = system_path(self.filepath)
         try:
             range_properties.keep(face_controls(context), native.part("ranges").load_ranges(path))
         except native.user_errors() as error:
@@ -165,7 +165,7 @@ class RISORIUS_OT_save_range(_HasRange, Operator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
     def execute(self, context: Context) -> Result:
-        path = bpy.path.abspath(self.filepath)
+        path = system_path(self.filepath)
         text = native.part("ranges").ranges_text(range_properties.all_of(face_controls(context)))
         try:
             native.part("importing").write_text(text, path)
