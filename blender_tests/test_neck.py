@@ -242,3 +242,35 @@ def test_a_bake_has_what_the_frames_had(face):
     for frame, wanted in live.items():
         bpy.context.scene.frame_set(frame)
         np.testing.assert_allclose(scene.snapshot(rig), wanted, atol=2e-5)
+
+
+def test_undo_and_redo_take_the_poses_along(face):
+    rig, dna = face()
+    bpy.ops.ed.undo_push(message="straight")
+    turn = Euler((0.3, -0.1, 0.2)).to_quaternion()
+    _pose(rig, "head", turn)
+    scene.update(scene.controls(rig))
+    bpy.ops.ed.undo_push(message="turned")
+    for step, head in ((bpy.ops.ed.undo, None), (bpy.ops.ed.redo, turn)):
+        assert step() == {"FINISHED"}
+        rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+        bpy.context.view_layer.update()
+        np.testing.assert_allclose(_shown(rig), _wanted(dna, head=head), atol=1e-5)
+
+
+def test_an_override_of_a_linked_face_fires_them(face, tmp_path):
+    rig, dna = face(name="Linked")
+    path = tmp_path / "library.blend"
+    collection = rig.users_collection[0].name
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.link(directory=f"{path}/Collection/", filename=collection)
+    bpy.context.view_layer.objects.active = next(
+        o for o in bpy.context.scene.objects if o.instance_collection
+    )
+    assert bpy.ops.risorius.make_override() == {"FINISHED"}
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o and not o.library)
+    turn = Euler((0.3, -0.1, 0.2)).to_quaternion()
+    _pose(rig, "head", turn)
+    scene.update(scene.controls(rig))
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, head=turn), atol=1e-5)
