@@ -38,7 +38,7 @@ from .ui.drag import tool as drag_tool
 from .ui.expressions import previews as expression_previews
 from .ui.expressions import properties as expression_properties
 from .ui.face import channel_preview, favourites_panel, paste_flipped
-from .ui.file import import_operators, rig_operators
+from .ui.file import framing_operators, import_operators, rig_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
 from .ui.menu import face_menu
@@ -135,6 +135,7 @@ def register() -> None:
     bpy.types.VIEW3D_MT_object.append(rig_operators.draw_make_rig)
     bpy.types.UI_MT_button_context_menu.append(favourites_panel.draw_button_menu)
     face_menu.register()
+    framing_operators.register()
     trouble = native.problem()
     manual.register()
     for sentence in (trouble, compat.notice()):
@@ -171,6 +172,7 @@ def unregister() -> None:
     timing_overlay.stop()
     drag_drawing.stop()
     expression_previews.forget()
+    framing_operators.unregister()
     face_menu.unregister()
     bpy.types.UI_MT_button_context_menu.remove(favourites_panel.draw_button_menu)
     bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)

@@ -5,6 +5,8 @@ import bpy
 
 from ... import native
 from ...scene.animation import tweaks
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import outlines
 from ..blender_types import Context, Icon, Menu, UILayout
 from ..common import active_controls
 from . import entries
@@ -31,9 +33,13 @@ class RISORIUS_MT_face(Menu):
         if native.problem():  # only what may mend it is of use
             layout.menu(entries.RISORIUS_MT_face_about.bl_idname)
             return
-        layout.operator("risorius.frame_face", icon="ZOOM_SELECTED")
+        layout.operator("risorius.frame_face", icon="ZOOM_SELECTED").instead = False
+        controls = active_controls(context)
+        hidden = controls is not None and outlines.are_hidden(controls)
+        text = "Show Outlines" if hidden else "Hide Outlines"
+        layout.operator("risorius.hide_outlines", text=text).hide = not hidden
         layout.separator()
-        _draw_pose(layout, context)
+        _draw_pose(layout, controls)
         layout.separator()
         for menu, icon in _PARTS:
             layout.menu(menu.bl_idname, icon=icon)
@@ -46,9 +52,8 @@ class RISORIUS_MT_face(Menu):
         layout.menu(entries.RISORIUS_MT_face_about.bl_idname, icon="BLANK1")
 
 
-def _draw_pose(layout: UILayout, context: Context) -> None:
+def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
     """What the hand does most."""
-    controls = active_controls(context)
     layout.operator("risorius.reset", icon="LOOP_BACK").region = ""
     layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
     layout.menu("RISORIUS_MT_expressions", icon="MONKEY")
