@@ -95,7 +95,7 @@ def _draw_tools(layout: UILayout, context: Context, linked: bool) -> None:
     manager, seen = context.window_manager, as_seen(context)
     column = layout.column(align=True)
     row = column.row(align=True)
-    row.prop(manager, "risorius_search", text="", icon="VIEWZOOM")
+    words.search(row, manager, "risorius_search")
     row.prop(manager, "risorius_only_used", text="", icon="FILTER")
     row.prop(manager, "risorius_stars", text="", icon="SOLO_OFF")
     row = column.row(align=True)
