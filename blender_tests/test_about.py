@@ -13,7 +13,7 @@ def test_the_self_test_says_that_the_module_works(monkeypatch):
     assert works
     assert "works" in text
     assert "Python 3." in text
-    assert "scalar" in text
+    assert "scalar" not in text  # which instructions a processor has is for the self-test
     words = text.partition(": ")[2].split(", ")
     assert all(w.strip(",") == w != "" for w in words), text
 

@@ -10,6 +10,7 @@ import sys
 import wave
 import zipfile
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -18,7 +19,7 @@ import risorius
 from mathutils import Euler, Vector
 from risorius import speech
 from support import scene
-from support.layout import Recorder
+from support.layout import Recorder, drawn
 
 JAW, PULL, BROW = (f"CTRL_expressions.{n}" for n in ("jawOpen", "mouthCornerPullL", "browDownL"))
 
@@ -580,6 +581,33 @@ def test_speech_without_the_recogniser_says_what_to_do(rig, voice, monkeypatch):
     monkeypatch.setattr(listening, "has_recogniser", lambda: False)
     with pytest.raises(RuntimeError, match="PocketSphinx: install it by the button"):
         bpy.ops.risorius.speak(filepath=str(voice))
+
+
+def test_a_missing_recogniser_is_said_before_a_file_is_chosen(rig, monkeypatch):
+    listening = scene.submodule("scene.animation.speech_task")
+    operators = scene.submodule("ui.speech.operators")
+    panel = scene.submodule("ui.animation.panel").RISORIUS_PT_animation
+    opened, said = [], []
+    monkeypatch.setattr(
+        operators.ImportHelper, "invoke", lambda *_: opened.append(1) or {"RUNNING_MODAL"}
+    )
+    press = SimpleNamespace(
+        wait_beside=lambda: None,
+        start_with=lambda _scene: None,
+        properties=SimpleNamespace(is_property_set=lambda _name: False),
+        report=lambda _kind, text: said.append(text),
+    )
+    for there in (False, True):
+        monkeypatch.setattr(listening, "has_recogniser", lambda found=there: found)
+        monkeypatch.setitem(listening._looked, "until", 0.0)
+        offers = "risorius.install_speech" in drawn(panel).operators
+        done = operators.RISORIUS_OT_speak.invoke(press, bpy.context, None)
+        assert (done, bool(opened), bool(said)) == (
+            ({"RUNNING_MODAL"}, True, True) if there else ({"CANCELLED"}, False, True)
+        )
+        assert offers is not there
+    assert "install it by the button" in said[0]
+    assert len(said) == 1
 
 
 def test_the_preferences_say_in_words_why_the_button_is_grey(monkeypatch):

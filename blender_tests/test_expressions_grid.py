@@ -252,9 +252,15 @@ def posed(face, *selected):
 
 
 def test_blenders_own_operators_apply_the_assets(rig):
+    stamp = scene.submodule("scene.animation.actions").stamp
+    stamp(bpy.data.actions.new("Face Smile, closed"))  # as an older version named it
     bpy.ops.risorius.make_pose_assets()
+    assert [a.name for a in bpy.data.actions if "smile, c" in a.name.lower()] == [
+        "Face Smile, closed"
+    ]
     joy = risorius.expressions.load()["joy"].weights
     action = bpy.data.actions["Face Joy"]
+    assert "Face PP" in bpy.data.actions  # a sound is called M B P in panels alone
     controls = posed(rig)
     controls.pose.apply_pose_from_action(action)
     goal = {JAW: joy[JAW], LEFT: joy[LEFT], RIGHT: joy[RIGHT]}

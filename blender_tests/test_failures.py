@@ -4,6 +4,7 @@
 import builtins
 import io
 from collections import Counter
+from types import SimpleNamespace
 
 import addon_utils
 import bpy
@@ -269,11 +270,19 @@ def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
     """What the status bar shows, and Esc: the task of the operator, without a window."""
     from risorius import sample
 
-    task = None
+    operator = scene.submodule("ui.file.import_operators").RISORIUS_OT_add_character
+    task, said = None, []
 
-    def build_sample(path, progress, **_options):
+    def say(share):
+        said.append(operator.shown(SimpleNamespace(_task=task), share))
+
+    def build_sample(path, progress, fetched, **_options):
+        assert fetched(sample.DATA_SIZE // 4)
+        say(0)
         assert progress(0.25)
+        say(25)
         task._cancelled.set()
+        assert not fetched(sample.DATA_SIZE)
         if not progress(0.5):
             raise sample.SourceError("stopped")
         path.write_bytes(b"")
@@ -286,6 +295,8 @@ def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
     assert task.share == 0.5
     assert str(task.error) == "stopped"
     assert not path.exists()
+    assert "data of 48 MB, once: 25 %" in said[0]
+    assert "Building the face: 25 %" in said[1]
 
 
 def test_add_face_without_data_says_why(monkeypatch, tmp_path, dna_file):

@@ -148,3 +148,29 @@ def test_undo_takes_the_face_and_leaves_the_view(window, dna_file):
     assert _state() == framed
     bpy.ops.ed.redo()
     assert _state() == framed
+
+
+def test_frame_face_shows_the_head_whatever_is_selected_and_keeps_the_direction(dna_file):
+    rig = scene.load(dna_file)
+    view, item = _view(), scene.meshes(rig)[0]
+    for perspective, direction in (("PERSP", (1.0, 0.2, 0.1)), ("ORTHO", (0.0, 0.0, 1.0))):
+        for selected in (scene.controls(rig), item):
+            bpy.context.view_layer.objects.active = selected
+            view.view_perspective = perspective
+            view.view_location, view.view_distance = (9.0, 9.0, 9.0), 70.0
+            view.view_rotation = Vector(direction).to_track_quat("Z", "Y")
+            turn = view.view_rotation.copy()
+            assert bpy.ops.risorius.frame_face() == {"FINISHED"}
+            assert view.view_rotation.rotation_difference(turn).angle < 1e-3
+            if perspective == "PERSP":
+                seen = _on_screen(_corners(item))
+                assert seen.min() > 0.0
+                assert seen.max() < 1.0
+                assert np.ptp(seen, axis=0).max() > 0.4
+    view.view_perspective = "CAMERA"
+    assert bpy.ops.risorius.frame_face() == {"FINISHED"}
+    assert view.view_perspective == "PERSP"
+    _area().spaces.active.lock_object = item
+    before = _state()
+    assert bpy.ops.risorius.frame_face() == {"CANCELLED"}
+    assert _state() == before

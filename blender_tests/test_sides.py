@@ -197,3 +197,19 @@ def test_a_driver_of_ones_own_is_left_alone(rig):
     found = scene.controls(rig).animation_data.drivers.find(path)
     assert found is not None
     assert found.driver.expression == "0.5"
+
+
+def test_the_rest_of_a_region_stands_under_more_which_counts_what_is_moved(rig):
+    face, labels = scene.face(rig), [f"{PREFIX}mouth{name}" for name in ("Press", "Dimple")]
+    panel = ui("face.controls_panel")
+    names = [f"{PREFIX}mouthCornerPullL", *labels]
+    part = panel._Part(bpy.context, face, "mouth", names, {}, {})
+
+    def lines(moved):
+        face[labels[0]], face[labels[1]] = moved, 0.0
+        layout = Part()
+        panel._draw_parted(layout, part, dict.fromkeys(names, 0.0))
+        return _texts(layout)
+
+    assert lines(0.0).index("Corner Pull R") < lines(0.0).index("More") < lines(0.0).index("Press")
+    assert "More: 1 moved" in lines(0.4)

@@ -78,7 +78,7 @@ def test_solo_shows_one_control_and_leaves_the_values(rig, dna_file, mode):
     alone = raw_with(rig, dna_file, mouthCornerPullL=0.0)
     assert scene.error_against_oracle(rig, dna_file, alone) < scene.TOLERANCE
     text = drawn(bpy.types.RISORIUS_PT_why).text()
-    assert "Solo: jawOpen" in text
+    assert "Solo: Jaw Open" in text
     bpy.ops.risorius.solo(control=PULL, extend=True)
     both = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, both) < scene.TOLERANCE
@@ -306,7 +306,11 @@ def test_a_control_and_its_correctives(rig):
     assert [(n, pytest.approx(v)) for n, v in part.others] == [("mouthCornerPullL", 0.4)]
     assert causes.parts_of(rig, 3) == []
     bpy.context.window_manager.risorius_why.control = JAW
-    assert part.name in drawn(bpy.types.RISORIUS_PT_why).text()
+    spoken = scene.submodule("ui.why.spoken").spoken
+    assert spoken(bpy.context, "jawOpen x mouthCornerPullL") == "Jaw Open x Mouth Corner Pull R"
+    text = drawn(bpy.types.RISORIUS_PT_why).text()
+    assert spoken(bpy.context, part.name) in text
+    assert "mouthCornerPull" not in text  # as the sliders are called, and on the side as seen
 
 
 def test_the_strongest_correctives_have_millimetres(rig, dna_file):

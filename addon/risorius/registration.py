@@ -26,6 +26,7 @@ from .ui import (
     layers,
     life,
     live,
+    menu,
     mixing,
     speech,
     why,
@@ -40,9 +41,10 @@ from .ui.export import live_faces
 from .ui.expressions import previews as expression_previews
 from .ui.expressions import properties as expression_properties
 from .ui.face import channel_preview, favourites_panel, paste_flipped
-from .ui.file import import_operators, rig_operators
+from .ui.file import framing_operators, import_operators, rig_operators
 from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
+from .ui.menu import face_menu
 from .ui.mixing import properties as mixing_properties
 from .ui.why import overlay as why_overlay
 from .ui.why import panel as why_panel
@@ -68,6 +70,7 @@ CLASSES = (
     *why.CLASSES,
     *live.CLASSES,
     *mixing.CLASSES,
+    *menu.CLASSES,
 )
 
 
@@ -134,6 +137,8 @@ def register() -> None:
     bpy.types.MESH_MT_shape_key_context_menu.append(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_object.append(rig_operators.draw_make_rig)
     bpy.types.UI_MT_button_context_menu.append(favourites_panel.draw_button_menu)
+    face_menu.register()
+    framing_operators.register()
     trouble = native.problem()
     manual.register()
     for sentence in (trouble, compat.notice()):
@@ -180,6 +185,8 @@ def unregister() -> None:
     timing_overlay.stop()
     drag_drawing.stop()
     expression_previews.forget()
+    framing_operators.unregister()
+    face_menu.unregister()
     bpy.types.UI_MT_button_context_menu.remove(favourites_panel.draw_button_menu)
     bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)
     bpy.types.MESH_MT_shape_key_context_menu.remove(rig_operators.draw_make_rig)

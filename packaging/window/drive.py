@@ -195,7 +195,7 @@ def see_why(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.click(*hand.find(r"risorius\.heat\(.*POSE"))
     hand.wait("a heat map", lambda: hand.ask("state")["heat"])
     after = hand.still()
-    yield "From Neutral colours the face", difference(before, after, box) > 0.3
+    yield "Heat Map from Neutral colours the face", difference(before, after, box) > 0.3
     hand.picture("heat")
     hand.click(*hand.find(r"risorius\.why_vertex"))
     corner = hand.ask("moved_by", control=SMILE[0])

@@ -38,6 +38,7 @@ _load_logic()
 names = importlib.import_module("risorius_addon_logic.base.names")
 face_regions = importlib.import_module("risorius_addon_logic.base.face_regions")
 sentences = importlib.import_module("risorius_addon_logic.base.sentences")
+first_sliders = importlib.import_module("risorius_addon_logic.character.first_sliders")
 slider_rows = importlib.import_module("risorius_addon_logic.character.slider_rows")
 slider_words = importlib.import_module("risorius_addon_logic.character.slider_words")
 lod_distance = importlib.import_module("risorius_addon_logic.character.lod_distance")
@@ -213,6 +214,31 @@ class TestLeftAndRight:
         assert [(row.title, row.is_pair) for row in rows] == [("Dimple R", False), ("Up", False)]
         rows = slider_rows.rows_of(["mouthDimpleL"], "mouth", REGIONS, False)
         assert rows[0].title == "Dimple L"
+
+    def test_what_is_used_most_stands_first_in_at_most_ten_lines(self) -> None:
+        names, regions = STANDARD.read_text(encoding="utf-8").split(), _all_regions()
+        groups = slider_words.group_controls(names, regions)
+        known = {slider_words.short_name(name) for name in names}
+        for region, listed in first_sliders.table().items():
+            assert set(listed) <= known
+            rows = slider_rows.rows_of([names[i] for i in groups[region]], region, regions, True)
+            first, more = first_sliders.part(rows, region)
+            assert sorted((*first, *more), key=str) == sorted(rows, key=str)
+            assert more == [row for row in rows if row in more]  # in the order of the file
+            assert 1 <= len(first) <= 10
+            shown = [slider_words.short_name(name) for row in first for name in row.sliders]
+            assert set(shown) == set(listed), region
+        mouth = [names[i] for i in groups["mouth"]]
+        first, more = first_sliders.part(
+            slider_rows.rows_of(mouth, "mouth", regions, False), "mouth"
+        )
+        assert [row.title for row in first[:2]] == ["Corner Pull", "Corner Depress"]
+        assert len(first) == 10
+        assert len(more) > 50
+
+    def test_a_face_with_names_of_its_own_has_all_its_lines(self) -> None:
+        rows = slider_rows.rows_of(["grin", "gap"], "mouth", REGIONS, True)
+        assert first_sliders.part(rows, "mouth") == (rows, [])
 
     def test_every_control_of_a_standard_face_has_its_place_once(self) -> None:
         names = STANDARD.read_text(encoding="utf-8").split()

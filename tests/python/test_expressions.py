@@ -63,6 +63,17 @@ def test_no_two_are_mistaken_for_each_other(standard_controls):
     assert alike.max() < 0.91, (shown[first].name, shown[second].name)
 
 
+def test_labels_are_words_of_animators_and_names_those_of_files():
+    found = expressions.load()
+    assert {name: found[name].label for name in ("sil", "PP", "FF", "CH", "I", "U")} == {
+        **{"sil": "Rest", "PP": "M B P", "FF": "F V"},
+        **{"CH": "Ch Sh", "I": "Ee", "U": "Oo"},
+    }
+    for expression in found.values():
+        assert all(word[0].isupper() for word in expression.label.split()), expression.label
+    assert len({expression.label for expression in found.values()}) == len(found)
+
+
 def test_what_visemes_do_to_jaw_and_lips():
     weights = {n: e.weights for n, e in expressions.load().items() if e.group == "viseme"}
 

@@ -2,6 +2,7 @@
 """The sample person: its parts by formula, and the whole against the data that it is made from."""
 
 import os
+import sys
 import tomllib
 from dataclasses import replace
 from importlib import resources
@@ -590,6 +591,38 @@ def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
     other.write_bytes(b"something else")
     with pytest.raises(source.SourceError, match="hash"):
         source.Source(other)
+
+
+# What stands in for pip: it writes a part where pip keeps it, waits to be looked at, and fails.
+PART = """
+import os, sys, tempfile, time
+path = os.path.join(tempfile.mkdtemp(), "part.whl")
+open(path, "wb").write(bytes(5000))
+while not os.path.exists(os.environ["SEEN"]):
+    time.sleep(0.01)
+sys.exit("the line is cut")
+"""
+
+
+@pytest.mark.parametrize("stops", [False, True])
+def test_what_has_come_is_told_while_data_are_fetched_and_false_ends_it(
+    stops, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("RISORIUS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("SEEN", str(tmp_path / "seen"))
+    monkeypatch.setattr(source, "_command", lambda *_: [sys.executable, "-S", "-c", PART])
+    told = []
+
+    def fetched(count):
+        told.append(count)
+        if count >= 5000 and not stops:
+            (tmp_path / "seen").touch()
+        return count < 5000 or not stops
+
+    with pytest.raises(source.SourceError, match="stopped" if stops else "the line is cut"):
+        source.fetch(fetched=fetched)
+    assert told[-1] >= 5000
+    assert not (tmp_path / "cache" / source.FILE_NAME).exists()
 
 
 def test_a_folder_that_is_not_there_is_said_before_anything_is_fetched(tmp_path, capsys):

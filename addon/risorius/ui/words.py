@@ -2,7 +2,7 @@
 """Words in panels and dialogs: whether they fit, and what a number or an empty field stands for."""
 
 import textwrap
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import blf
@@ -68,6 +68,24 @@ def prop_or(
         row = layout.row()
         row.alignment, row.active = "RIGHT", False
         row.label(text=meaning, text_ctxt=CONTEXT)
+
+
+def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
+    """A field for words to look for. Blender writes Search into it, in few languages.
+
+    Args:
+        layout: of the panel.
+        owner, name: the property.
+    """
+    placeholder: Any = {"placeholder": say("Search")} if _has_placeholder() else {}
+    layout.prop(owner, name, text="", icon="VIEWZOOM", **placeholder)
+
+
+@cache
+def _has_placeholder() -> bool:
+    """Whether fields of this Blender can say what they are for."""
+    functions: Any = bpy.types.UILayout.bl_rna.functions  # pyright: ignore  the stub has none
+    return "placeholder" in functions["prop"].parameters
 
 
 def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:

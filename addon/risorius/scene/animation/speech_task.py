@@ -9,6 +9,7 @@ import platform
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from importlib.machinery import PathFinder
 from pathlib import Path
@@ -20,6 +21,9 @@ from ...logic.animation import recogniser
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..base.task import Task
+
+_LOOK_EVERY = 3.0  # seconds
+_looked: dict[str, float] = {"lacks": False, "until": 0.0}
 
 
 class SpeechTask(Task["native.Clip"]):
@@ -44,6 +48,14 @@ def has_recogniser() -> bool:
     importlib.invalidate_caches()
     places = [*sys.path, str(packages_folder())]
     return PathFinder.find_spec("pocketsphinx", places) is not None
+
+
+def lacks_recogniser() -> bool:
+    """The opposite for a panel, which asks with each drawing: looked up once in some seconds."""
+    now = time.monotonic()
+    if now > _looked["until"]:
+        _looked.update(lacks=not has_recogniser(), until=now + _LOOK_EVERY)
+    return bool(_looked["lacks"])
 
 
 def packages_folder() -> Path:
@@ -73,6 +85,7 @@ def install_recogniser() -> None:
         done = subprocess.run(
             command, env=environment, capture_output=True, text=True, errors="replace", check=False
         )
+    _looked["until"] = 0.0
     if done.returncode:
         running = f"Python {sys.version_info.major}.{sys.version_info.minor}"
         running += f" on {platform.system()} {platform.machine()}"

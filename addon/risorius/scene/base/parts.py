@@ -47,6 +47,7 @@ MAPS = "maps"  # on the deforming armature: values of the animated maps
 CHANNELS = "channels"  # on the deforming armature: values of the channels
 FACE = "face"  # the bone of the control armature that bears the controls
 PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
+OUTLINES = "risorius_outlines"  # on the control armature: sizes of its hidden outlines, by PART
 BOARD = "risorius_board"  # on the bones of the face board: the name of each
 LEAD = "risorius_lead"  # on the control armature: "BOARD" where the face board moves the face
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated

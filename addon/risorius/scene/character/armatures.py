@@ -10,6 +10,7 @@ from typing import Any, cast
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from numpy.typing import NDArray
 
 from ... import native
 from ...language import tables
@@ -237,7 +238,7 @@ def build_controls(
     made.append(data)
     controls = cast("ArmatureObject", bpy.data.objects.new(f"{plan.name}_controls", data))
     made.append(controls)
-    places = control_places(plan)
+    places, room = control_places(plan), outline_room(plan)
     with _edit_bones(context, controls, workshop) as edit_bones:
         for name, (position, axis, length, _parent) in places.items():
             bone = edit_bones.new(name)
@@ -257,7 +258,7 @@ def build_controls(
             bone.lock_location = (True, True, True)
         if name in ("face", "eyes"):
             bone.lock_rotation = (True, True, True)
-        bone_shapes.place(bone, name)
+        bone_shapes.place(bone, name, room)
     data.bones.active = data.bones[parts.FACE]
     controls.show_in_front = True
     controls[parts.OVERDRIVE] = False
@@ -288,10 +289,29 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
         else:
             eyes[side] = middle + np.array([sign * size * 0.13, -size * 0.25, 0.0])
         places[f"eye_{side}"] = (tuple(eyes[side]), ahead, size * 0.12, "head")
-    target = (eyes["L"] + eyes["R"]) / 2 + np.array([0.0, -size * 1.6, 0.0])
+    between = (eyes["L"] + eyes["R"]) / 2
+    target = between + np.array([0.0, -size * 1.6, 0.0])
     places["eyes"] = (tuple(target), ahead, size * 0.12, "head")
-    places["face"] = ((high[0] + size * 0.25, middle[1], middle[2]), up, size * 0.12, "head")
+    centre, wide = _sides(points, between[2], size)
+    side = (centre + wide + size * 0.2, float(middle[1]), float(between[2] - size * 0.15))
+    places["face"] = (side, up, size * 0.12, "head")
     return places
+
+
+def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
+    """What the outlines of the control bones stand beside. Args: plan  of the face."""
+    points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
+    between = control_places(plan)["eyes"][0]
+    middle, wide = _sides(points, between[2], plan.size)
+    return bone_shapes.Room(middle, float(between[0]), wide, float(points[:, 2].max()))
+
+
+def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[float, float]:
+    """Middle and half width of a head at the height of its eyes: shoulders are lower."""
+    near = np.abs(points[:, 2] - height) < 0.1 * size
+    # A face without skin at its eyes has the width of all of it.
+    across = points[near if near.any() else slice(None), 0]
+    return float(across.max() + across.min()) / 2, float(np.ptp(across)) / 2
 
 
 def add_properties(

@@ -5,11 +5,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import bpy
+from mathutils import Vector
 
 Line = Sequence[tuple[float, float]]  # corners in the xy plane, the last joined to the first
 _COUNT = 32
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a face takes at the height of its eyes, in the space of its control armature.
+
+    Attributes:
+        middle: x of its middle.
+        eyes: x between them.
+        wide: from the middle to its side.
+        top: z of its highest point, hair included.
+    """
+
+    middle: float
+    eyes: float
+    wide: float
+    top: float
 
 
 def _ring(size: float = 1.0, x: float = 0.0, y: float = 0.0, flat: float = 1.0) -> Line:
@@ -115,27 +134,55 @@ def disc(name: str) -> bpy.types.Object:
     return bpy.data.objects.new(name, mesh)
 
 
-def place(bone: bpy.types.PoseBone, name: str) -> None:
-    """Turn and size the outline so that it surrounds what the bone turns, and colour it.
+def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
+    """Turn and size the outline so that it stands beside what the bone turns, and colour it.
+
+    From the front nothing lies over the eyes, and what Blender frames with the bones is the head.
 
     Args:
         bone: the control bone, which has its outline.
-        name: what it is.
+        name: which of the control bones it is.
+        room: what the face takes.
     """
-    if name in ("neck", "head"):  # around the upright bone
-        bone.custom_shape_scale_xyz = (0.9, 0.9, 0.9) if name == "head" else (1.7, 1.7, 1.7)
+    scale, offset = _placed(bone.bone, name, room)
+    bone.custom_shape_scale_xyz = (scale, scale, scale)
+    bone.custom_shape_translation = offset
+    if name != "face":  # around the upright bone, or across one that looks ahead
         bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
-        if name == "head":
-            bone.custom_shape_translation = (0.0, bone.length * 1.6, 0.0)
-    elif name == "face":  # beside the face, seen from the front
-        bone.custom_shape_scale_xyz = (0.7, 0.7, 0.7)
-    else:  # they look ahead
-        scale = 0.7 if name == "eyes" else 0.6
-        bone.custom_shape_scale_xyz = (scale, scale, scale)
-        bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
-        if name != "eyes":
-            bone.custom_shape_translation = (0.0, bone.length * 1.5, 0.0)
     colour(bone, _COLOURS[name])
+
+
+def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
+    """Whether an outline stands as `place` puts it: the user has neither sized nor moved it.
+
+    Args:
+        bone: the control bone.
+        name: which of the control bones it is.
+        room: what the face takes.
+    """
+    scale, offset = _placed(bone.bone, name, room)
+    near = 1e-3 * bone.bone.length
+    sized = (bone.custom_shape_scale_xyz - Vector((scale, scale, scale))).length
+    return sized < 1e-3 and (bone.custom_shape_translation - offset).length < near
+
+
+def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]:
+    """Radius in lengths of the bone, and the way from its head in its own space."""
+    length, head = bone.length, bone.head_local
+    if name == "head":  # a ring above the hair
+        radius = 0.9 * room.wide
+        return radius / length, Vector((0.0, room.top - head.z + 0.25 * radius, 0.0))
+    if name == "neck":
+        return 1.2 * room.wide / length, Vector()
+    if name == "face":
+        return 0.7, Vector()
+    if name == "eyes":  # small: it stands between a near view and the face
+        return 0.18, Vector()
+    radius = 0.4 * length  # beside the temple of its side
+    away = 1 if head.x >= room.eyes else -1
+    aside = Vector((room.middle + away * (room.wide + 1.3 * radius) - head.x, 0.0, 0.0))
+    turn = bone.matrix_local.to_3x3().inverted()
+    return 0.4, turn @ aside + Vector((0.0, 0.5 * length, 0.0))
 
 
 def colour(bone: bpy.types.PoseBone, normal: tuple[float, float, float]) -> None:

@@ -75,8 +75,11 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
     """
     pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
-    name = f"Face {expression.label}"
-    old = bpy.data.actions.get(name)
+    # A sound has its name in files and libraries: its label is for panels.
+    sound = expression.group == "viseme"
+    name = f"Face {expression.name if sound else expression.label}"
+    old = _named(name)
+    name = old.name if old is not None else name
     if old is not None and old.library is None and not actions.was_edited(old):
         bpy.data.actions.remove(old)
     action = clip_actions.make_action(rig, clip, clip_logic.Timing(24.0), name).action
@@ -95,6 +98,12 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
     action[MARK] = asset[MARK] = native.part("expressions").text_of(expression)
     give_picture(action, picture_of(rig, expression))
     return action
+
+
+def _named(name: str) -> bpy.types.Action | None:
+    """The action of a name, also in the small letters that labels had."""
+    wanted = name.casefold()
+    return next((action for action in bpy.data.actions if action.name.casefold() == wanted), None)
 
 
 def picture_of(rig: ArmatureObject, expression: native.Expression) -> Path:

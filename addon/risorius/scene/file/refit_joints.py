@@ -16,7 +16,7 @@ from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
 from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from ..character import armatures
+from ..character import armatures, bone_shapes
 from .file_change import Change
 
 _EPS = float(np.finfo(np.float32).eps)
@@ -334,9 +334,14 @@ def replace_control_places(context: Context, change: Change) -> None:
         return
     if controls.data.users > 1:
         controls.data = controls.data.copy()
+    room, bones = armatures.outline_room(change.old), controls.pose.bones
+    placed = [name for name in movable if bone_shapes.is_placed(bones[name], name, room)]
     with armatures.edit_armature(context, controls.data) as edit_bones:
         for name in movable:
             position, axis, length, _parent = new[name]
             bone = edit_bones[name]
             bone.head = position
             bone.tail = Vector(position) + Vector(axis) * length
+    room = armatures.outline_room(change.new)
+    for name in placed:
+        bone_shapes.place(controls.pose.bones[name], name, room)

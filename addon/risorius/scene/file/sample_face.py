@@ -10,8 +10,18 @@ from ... import native
 from ..base.task import Task, telling
 
 
-def sample_task(path: Path, person: str, *, offline: bool) -> Task[bool]:
-    """A task that builds a person and writes the file with its textures; its result is True.
+class SampleTask(Task[bool]):
+    """Builds a person and writes the file with its textures; its result is True.
+
+    Attributes:
+        fetched: share of the data that has come, 0 to 1, while they are fetched; else None.
+    """
+
+    fetched: float | None = None
+
+
+def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
+    """A task that builds a person.
 
     Args:
         path: of the DNA file; its folder may hold the wheel of data.
@@ -22,16 +32,27 @@ def sample_task(path: Path, person: str, *, offline: bool) -> Task[bool]:
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> bool:
         path.parent.mkdir(parents=True, exist_ok=True)
+
+        def came(count: int) -> bool:
+            task.fetched = min(count / sample.DATA_SIZE, 1.0)
+            return not cancelled()
+
+        def tell(share: float) -> bool:
+            task.fetched = None if share > 0.0 else task.fetched
+            return telling(progress, cancelled)(share)
+
         sample.build_sample(
             path,
             person=sample.PEOPLE[person],
             data=_data(path.parent),
             offline=offline,
-            progress=telling(progress, cancelled),
+            progress=tell,
+            fetched=came,
         )
         return True
 
-    return Task(work)
+    task = SampleTask(work)
+    return task
 
 
 def can_be_built(folder: Path) -> bool:

@@ -14,7 +14,7 @@ from ... import native
 from ..animation import layer_mixing, layers
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
-from ..character import board, lods, rig_placement, runtime
+from ..character import board, lods, outlines, rig_placement, runtime
 from ..frame import (
     caches,
     channel_preview,
@@ -28,10 +28,12 @@ from ..why import causes, displacement, heat
 from ..why import present as why_present
 from . import applied_transforms, bone_edits, duplicates, migrations, repair
 
-# objects: session uids of those seen; mended: of characters that were mended at the last update.
+# objects: session uids of those seen; faces: of control armatures that are not new;
+# mended: of characters that were mended at the last update.
 # rendering: since a render began.
 _state: dict[str, Any] = {
     "objects": frozenset(),
+    "faces": frozenset(),
     "busy": False,
     "mended": set(),
     "rendering": False,
@@ -128,11 +130,27 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     if new or len(bpy.data.objects) != len(known):
         _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
+        _tidy_new()
         layer_mixing.forget_unused(map(parts.controls_of, parts.rigs()))
         console.say(*migrations.bring_up_all())
         console.say(*duplicates.separate_all())
         sharing.keep()
         lateness.forget()
+
+
+@persistent
+def _imported(*_arguments: object) -> None:
+    """After Append, before its undo step is made: Blender 4.3 and later tell of it."""
+    if not native.problem():
+        _tidy_new()
+
+
+def _tidy_new() -> None:
+    """Outlines of faces that were appended leave the scene; what the user links later stays."""
+    there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
+    for uid in there.keys() - _state["faces"]:
+        outlines.tidy(there[uid])
+    _state["faces"] = frozenset(there)
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
@@ -216,10 +234,10 @@ def _restored(*_arguments: object) -> None:
     _state["objects"] = frozenset()
     if native.problem():
         return
-    for rig in parts.rigs():
-        controls = parts.controls_of(rig)
-        if controls is not None:
-            controls.update_tag()
+    there = [c for c in map(parts.controls_of, parts.rigs()) if c is not None]
+    _state["faces"] = frozenset(controls.session_uid for controls in there)
+    for controls in there:
+        controls.update_tag()
 
 
 @persistent
@@ -280,6 +298,7 @@ _HANDLERS = (
     ("load_post", _loaded),
     ("undo_post", _restored),
     ("redo_post", _restored),
+    ("blend_import_post", _imported),
     ("save_pre", _before_save),
     ("save_post", _saved),
     ("save_post_fail", _saved),
@@ -290,10 +309,15 @@ _HANDLERS = (
 )
 
 
+def _there() -> list[tuple[str, Any]]:
+    """The handlers that this Blender calls."""
+    return [row for row in _HANDLERS if hasattr(bpy.app.handlers, row[0])]
+
+
 def register() -> None:
     """Add the handlers, and bring up what is already there."""
-    _state.update(objects=frozenset(), busy=False, mended=set(), rendering=False)
-    for name, handler in _HANDLERS:
+    _state.update(objects=frozenset(), faces=frozenset(), busy=False, mended=set(), rendering=False)
+    for name, handler in _there():
         present = getattr(bpy.app.handlers, name)
         if handler not in present:
             present.append(handler)
@@ -304,7 +328,7 @@ def unregister() -> None:
     heat.end_all()
     if look_masks.take_away():
         refresh()
-    for name, handler in reversed(_HANDLERS):
+    for name, handler in reversed(_there()):
         present = getattr(bpy.app.handlers, name)
         if handler in present:
             present.remove(handler)

@@ -8,6 +8,7 @@ the deforming armature, so that undo finds it; a file never has any of it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 from typing import cast
@@ -280,21 +281,22 @@ def _look() -> float | None:
     return max(_PAUSE, 3.0 * (perf_counter() - begin))
 
 
-def title(rig: ArmatureObject, heat: Heat) -> str:
+def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -> str:
     """What a heat map shows, in a sentence.
 
     Args:
         rig: deforming armature of the face.
         heat: its heat map.
+        called: gives the words for the name of a control or corrective.
     """
     if heat.kind == "POSE":
         return told("Moved from neutral")
     if heat.kind == "CONTROL":
-        return told("Reach of {name}", name=heat.what.rpartition(".")[2])
+        return told("Reach of {name}", name=called(heat.what.rpartition(".")[2]))
     live, controls = runtime.of(rig), parts.controls_of(rig)
     if heat.kind == "CORRECTIVE":
         name = present.name_of(live, int(heat.what)) if live is not None else heat.what
-        return told("Added by {name}", name=name)
+        return told("Added by {name}", name=called(name))
     places = layers.places(controls) if controls is not None else ()
     name = places[int(heat.what)].name if int(heat.what) < len(places) else heat.what
     return told("Added by layer {name}", name=name)

@@ -63,7 +63,7 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
     """List what the active face is made of, mesh by mesh"""
 
     bl_idname = "risorius.describe"
-    bl_label = "What Is in It"
+    bl_label = "Contents of the Face"
     baked_too = True
     bl_options = {"REGISTER"}
 
@@ -74,7 +74,7 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
         if not bpy.app.background:
             context.window_manager.popup_menu(
                 lambda menu, _context: [words.show(menu.layout, line) for line in lines],
-                title=words.say("What is in this face"),
+                title=words.say("Contents of the Face"),
                 icon="INFO",
             )
         return {"FINISHED"}

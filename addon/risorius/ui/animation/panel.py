@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The panel from which animation comes in, with what the last import had to say."""
 
+from ...scene.animation import speech_task
 from .. import words
 from ..blender_types import Context, Panel
 from ..common import FaceOnlyPanel, face_controls
@@ -26,6 +27,9 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         column.operator("risorius.learn_range", icon="DRIVER_DISTANCE")
         column.operator("risorius.speak", icon="SPEAKER")
         column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
+        if speech_task.lacks_recogniser():
+            words.write(layout, "Speak from Audio needs the package PocketSphinx (28 MB).", "INFO")
+            layout.operator("risorius.install_speech", icon="IMPORT")
         data = face_controls(context).animation_data
         action = data.action if data is not None else None
         lines = report_of(action)

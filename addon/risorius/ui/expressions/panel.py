@@ -50,7 +50,7 @@ class RISORIUS_PT_expressions(FaceOnlyPanel, Panel):
 def _draw_tools(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
     column = layout.column(align=True)
     row = column.row(align=True)
-    row.prop(chosen, "search", text="", icon="VIEWZOOM")
+    words.search(row, chosen, "search")
     row.operator("risorius.render_thumbnails", text="", icon="FILE_REFRESH").again = True
     row.menu(RISORIUS_MT_expressions.bl_idname, text="", icon="DOWNARROW_HLT")
     row = column.row(align=True)
@@ -75,7 +75,9 @@ def _chosen(items: list[library.Item], chosen: RISORIUS_PG_expressions) -> list[
     found = []
     for item in items:
         expression = item.expression
-        text = f"{expression.label} {words.say(expression.label)} {expression.description}".lower()
+        # By its name too, which is a library's: PP of M B P.
+        named = f"{expression.name} {expression.label} {words.say(expression.label)}"
+        text = f"{named} {expression.description}".lower()
         fits = group in (ALL, expression.group) or expression.name in starred
         if fits and all(word in text for word in sought):
             found.append(item)

@@ -3,13 +3,14 @@
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import bpy
 
 from ... import native
 from ...language import tables
 from ...logic.base.control_words import PREFIX
-from ...logic.character import slider_rows, slider_words
+from ...logic.character import first_sliders, slider_rows, slider_words
 from ...scene.base import parts
 from ...scene.character import board, runtime, sides
 from .. import words
@@ -65,7 +66,8 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
             header, body = layout.panel(f"RISORIUS_PT_region_{region}", default_closed=True)
             _draw_region_header(header, region)
             if body is not None:
-                draw_sliders(context, body, face, region, names, followers, given)
+                part = _Part(context, face, region, names, followers, given)
+                _draw_parted(body, part, dict(zip(live.labels, live.rests, strict=True)))
         if not shown:
             nothing = "No control has these words." if search else "All controls are at rest."
             words.write(layout, nothing, "INFO")
@@ -79,8 +81,9 @@ def _regions(shown: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
 
 
 @lru_cache(maxsize=64)
-def _rows(names: tuple[str, ...], region: str, seen: bool) -> list[slider_rows.Row]:
-    return slider_rows.rows_of(names, region, native.regions(), seen)
+def _rows(names: tuple[str, ...], region: str, seen: bool) -> first_sliders.Parted:
+    rows = slider_rows.rows_of(names, region, native.regions(), seen)
+    return first_sliders.part(rows, region)
 
 
 def _is_found(name: str, search: str) -> bool:
@@ -92,7 +95,7 @@ def _draw_tools(layout: UILayout, context: Context, linked: bool) -> None:
     manager, seen = context.window_manager, as_seen(context)
     column = layout.column(align=True)
     row = column.row(align=True)
-    row.prop(manager, "risorius_search", text="", icon="VIEWZOOM")
+    words.search(row, manager, "risorius_search")
     row.prop(manager, "risorius_only_used", text="", icon="FILTER")
     row.prop(manager, "risorius_stars", text="", icon="SOLO_OFF")
     row = column.row(align=True)
@@ -119,6 +122,20 @@ def _draw_region_header(layout: UILayout, region: str) -> None:
     row.operator("risorius.key", text="", icon="KEY_HLT").region = region
 
 
+class _Part(NamedTuple):
+    """What is drawn of a region, see `draw_sliders`."""
+
+    context: Context
+    face: bpy.types.PoseBone
+    region: str
+    names: Sequence[str]
+    followers: Mapping[str, str]
+    given: Mapping[str, float]
+
+    def lines(self) -> first_sliders.Parted:
+        return _rows(tuple(self.names), self.region, as_seen(self.context))
+
+
 def draw_sliders(
     context: Context,
     layout: UILayout,
@@ -142,9 +159,30 @@ def draw_sliders(
         followers: those that follow another one, with the one that leads.
         given: what the face board gives, by the names of its sliders.
     """
+    part = _Part(context, face, region, names, followers, given)
+    first, more = part.lines()
+    _draw_lines(layout, part, [*first, *more])
+
+
+def _draw_parted(layout: UILayout, part: _Part, rests: Mapping[str, float]) -> None:
+    """The sliders that are used most, the others behind More, with how many of them are moved."""
+    first, more = part.lines()
+    _draw_lines(layout, part, first)
+    if not more:
+        return
+    header, body = layout.panel(f"RISORIUS_PT_more_{part.region}", default_closed=True)
+    names = [name for line in more for name in line.sliders]
+    moved = sum(part.face.get(name, rests[name]) != rests[name] for name in names)
+    text = words.say("More: {count} moved", count=moved) if moved else words.say("More")
+    words.show(header, text)
+    if body is not None:
+        _draw_lines(body, part, more)
+
+
+def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row]) -> None:
     column = layout.column(align=True)
+    context, followers = part.context, part.followers
     ruler = words.Ruler(context, _TITLE)
-    lines = _rows(tuple(names), region, as_seen(context))
     starred = favourites_of(context) if context.window_manager.risorius_stars else None
     if any(line.is_pair for line in lines):
         _draw_sides(column, bool(followers))
@@ -157,11 +195,11 @@ def draw_sliders(
             row = column
         row = row.row(align=True)
         for name in line.sliders:
-            if name in given:
-                words.bar(row, given[name])
-            elif followers.get(name) not in names:
+            if name in part.given:
+                words.bar(row, part.given[name])
+            elif followers.get(name) not in part.names:
                 quoted = bpy.utils.escape_identifier(name)
-                row.prop(face, f'["{quoted}"]', text="", slider=True)
+                row.prop(part.face, f'["{quoted}"]', text="", slider=True)
         if starred is not None:
             icon = "SOLO_ON" if set(line.sliders) <= set(starred) else "SOLO_OFF"
             button = row.operator("risorius.favourite", text="", icon=icon)

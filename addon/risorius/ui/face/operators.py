@@ -134,7 +134,7 @@ class RISORIUS_OT_separate(FaceOperator, Operator):
     """Give a copied face materials, shapes and drivers of its own"""
 
     bl_idname = "risorius.separate"
-    bl_label = "Make Independent"
+    bl_label = "Make Single User"
 
     def execute(self, context: Context) -> Result:
         for sentence in duplicates.separate(face_rig(context)):

@@ -191,9 +191,7 @@ class RISORIUS_PT_options(FaceOnlyPanel, Panel):
             )
             words.show(
                 column,
-                words.say(
-                    "{shapes} shapes, {simd}", shapes=live.rig.blend_shape_count, simd=live.rig.simd
-                ),
+                words.say("{shapes} shapes", shapes=live.rig.blend_shape_count),
             )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""After an import the 3D views show the face: it is a speck in a view of the default scene."""
+"""3D views show the face: after an import, where it would be a speck, and when one asks for it."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -41,6 +41,50 @@ def frame(context: Context, rig: ArmatureObject) -> None:
         _frame(area, middle, radius, turn)
 
 
+def show_whole(context: Context, rig: ArmatureObject) -> int:
+    """Let the 3D view of the context, else all of the window, show a face.
+
+    Each keeps its direction; outlines of bones and the face board do not count. A view through
+    a camera leaves the camera, as with Blender's Frame Selected.
+
+    Args:
+        context: a Blender context.
+        rig: deforming armature of the face.
+
+    Returns:
+        How many views show it. One that is locked to an object or the 3D cursor does not.
+    """
+    screen = context.window.screen if context.window is not None else None
+    areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
+    if context.area in areas:
+        areas = [context.area]
+    middle, radius = _ball(rig)
+    shown = 0
+    for area in areas:
+        space, region = _view(area), _window_of(area)
+        if region is None or _is_locked(space):
+            continue
+        for view in (space.region_3d, *space.region_quadviews):
+            if view is None:
+                continue
+            if view.view_perspective == "CAMERA":
+                view.view_perspective = "PERSP"
+            perspective = view.view_perspective == "PERSP"
+            size = (region.width, region.height)
+            view.view_location = middle
+            view.view_distance = view_fit.distance(radius, space.lens, size, perspective)
+        shown += 1
+    return shown
+
+
+def _window_of(area: bpy.types.Area) -> bpy.types.Region | None:
+    return next((r for r in area.regions if r.type == "WINDOW"), None)
+
+
+def _is_locked(space: bpy.types.SpaceView3D) -> bool:
+    return space.lock_object is not None or space.lock_cursor
+
+
 def _view(area: bpy.types.Area) -> bpy.types.SpaceView3D:
     return cast(bpy.types.SpaceView3D, area.spaces.active)
 
@@ -52,9 +96,8 @@ def _show_textures(shading: bpy.types.View3DShading) -> None:
 
 def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Quaternion) -> None:
     space = _view(area)
-    region = next((r for r in area.regions if r.type == "WINDOW"), None)
-    locked = space.lock_object is not None or space.lock_cursor
-    if region is None or locked:
+    region = _window_of(area)
+    if region is None or _is_locked(space):
         return
     for view in (space.region_3d, *space.region_quadviews):
         if view is None or view.view_perspective == "CAMERA":

@@ -286,6 +286,10 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         return {"CANCELLED"}
 
     def shown(self, share: int) -> str:
+        came = self._task.fetched
+        if came is not None:
+            text = "Fetching data of 48 MB, once: {share} %, Esc cancels"
+            return words.say(text, share=round(came * 100))
         return words.say("Building the face: {share} %, Esc cancels", share=share)
 
     def cancelled_text(self) -> str:

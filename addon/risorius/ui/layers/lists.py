@@ -27,7 +27,9 @@ class RISORIUS_UL_layers(UIList):
         part = row.row(align=True)
         part.scale_x = 0.7
         part.prop(item, "weight", text="")
-        row.prop(item, "solo", text="", emboss=False, icon="SOLO_ON" if item.solo else "SOLO_OFF")
+        row.prop(
+            item, "solo", text="", emboss=False, icon="RADIOBUT_ON" if item.solo else "RADIOBUT_OFF"
+        )
         tick: Icon = "CHECKBOX_DEHLT" if item.mute else "CHECKBOX_HLT"
         row.prop(item, "mute", text="", emboss=False, icon=tick, invert_checkbox=True)
 

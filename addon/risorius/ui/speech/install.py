@@ -6,7 +6,7 @@ import bpy
 from ... import native
 from ...scene.animation import speech_task
 from .. import words
-from ..blender_types import Context, Operator, Result, UILayout
+from ..blender_types import Context, Menu, Operator, Result, UILayout
 from ..common import usable
 
 _OFFLINE = "Allow online access first: Preferences, System, Network."
@@ -33,8 +33,19 @@ class RISORIUS_OT_install_speech(Operator):
         except native.user_errors() as error:
             self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
-        self.report({"INFO"}, words.say("PocketSphinx is installed."))
+        self.report({"INFO"}, words.say("PocketSphinx is installed: Speak from Audio is ready."))
         return {"FINISHED"}
+
+
+def offer(context: Context) -> None:
+    """Say in a menu beside the pointer what speech lacks, with the button that installs it."""
+
+    def draw(menu: Menu, _context: Context) -> None:
+        _draw_button(menu.layout)
+
+    if not bpy.app.background:
+        title = words.say("Speak from Audio")
+        context.window_manager.popup_menu(draw, title=title, icon="INFO")  # pyright: ignore  ours
 
 
 def draw_preferences(layout: UILayout) -> None:
@@ -42,6 +53,10 @@ def draw_preferences(layout: UILayout) -> None:
     if speech_task.has_recogniser():
         layout.label(text="Speak from Audio is ready.", text_ctxt=words.CONTEXT, icon="CHECKMARK")
         return
+    _draw_button(layout)
+
+
+def _draw_button(layout: UILayout) -> None:
     words.show(
         layout, words.say("Speak from Audio needs the package PocketSphinx (28 MB)."), "INFO"
     )

@@ -17,9 +17,11 @@ from ..animation.place_clip import PlacesClip
 from ..beside import RunsBeside
 from ..blender_types import Context, ImportHelper, Operator, Result
 from ..common import explain, face_rig, system_path
+from . import install
 
 _MISSING = (
-    "Speech needs the package PocketSphinx: install it by the button in the add-on's preferences."
+    "Speech needs the package PocketSphinx: install it by the button in the panel Animation or in "
+    "the add-on's preferences."
 )
 
 _FADE = 0.1  # seconds in which a voice's layer comes and goes
@@ -59,6 +61,10 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        if not speech_task.has_recogniser():  # before anybody chooses a file and types words
+            install.offer(context)
+            self.report({"WARNING"}, words.say(_MISSING))
+            return {"CANCELLED"}
         self.wait_beside()
         self.start_with(context.scene)
         if self.properties.is_property_set("filepath"):

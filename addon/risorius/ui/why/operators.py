@@ -16,6 +16,7 @@ from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 from ..words import of_error, say
 from .properties import choices
+from .spoken import title
 
 MUTED = (
     ("JOINTS", "Joints", "All joints rest"),
@@ -145,7 +146,7 @@ class RISORIUS_OT_heat(FaceOperator, Operator):
         except native.user_errors() as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}
-        text = say("{what}: up to {most:.2f} mm", what=heat.title(rig, shown), most=shown.most)
+        text = say("{what}: up to {most:.2f} mm", what=title(context, rig, shown), most=shown.most)
         self.report({"INFO"}, text)
         return {"FINISHED"}
 

@@ -19,6 +19,7 @@ from ...scene.why import causes, heat, present
 from .. import words
 from ..blender_types import Context
 from .properties import choices
+from .spoken import spoken, title
 
 Colour = tuple[float, float, float, float]
 _handles: list[object] = []
@@ -101,9 +102,9 @@ def _draw() -> None:
     # Above the settings of the last operator, which lie in this corner.
     x, y = 20.0 * pen.scale + _tools(context), 72.0 * pen.scale
     if shown is not None:
-        y = _draw_ramp(pen, rig, shown, x, y)
+        y = _draw_ramp(pen, words.say(title(context, rig, shown)), shown, x, y)
     if not look.is_whole:
-        y = _draw_look(pen, look, x, y)
+        y = _draw_look(pen, look_in_words(context, look), x, y)
     if graph:
         _draw_graph(pen, context, rig, x, y)
     gpu.state.blend_set("NONE")
@@ -114,11 +115,10 @@ def _tools(context: Context) -> int:
     return next((r.width for r in regions if r.type == "TOOLS"), 0)
 
 
-def _draw_ramp(pen: _Pen, rig: ArmatureObject, shown: heat.Heat, x: float, y: float) -> float:
+def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> float:
     """The colours with their range. Returns where the next thing may stand."""
     width, height, unit = 220.0 * pen.scale, 14.0 * pen.scale, pen.scale
-    title = words.say(heat.title(rig, shown))
-    full = max(width, pen.width(title)) + 20 * unit
+    full = max(width, pen.width(text)) + 20 * unit
     pen.box(x - 10 * unit, y - 8 * unit, full, height + 48 * unit, _BOX)
     shades = heat_ramp.colours(np.linspace(0.0, 1.0, _STEPS))
     step = width / _STEPS
@@ -127,18 +127,19 @@ def _draw_ramp(pen: _Pen, rig: ArmatureObject, shown: heat.Heat, x: float, y: fl
     pen.text("0", x, y)
     end = f"{shown.most:.2f} mm"
     pen.text(end, x + width - pen.width(end), y)
-    pen.text(title, x, y + height + 22 * unit)
+    pen.text(text, x, y + height + 22 * unit)
     return y + height + 52 * unit
 
 
-def look_in_words(look: look_masks.Look) -> str:
+def look_in_words(context: Context, look: look_masks.Look) -> str:
     """What is left out of a face, in a sentence.
 
     Args:
+        context: has the preferences.
         look: what is shown.
     """
     if look.solo:
-        names = ", ".join(sorted(label.rpartition(".")[2] for label in look.solo))
+        names = ", ".join(sorted(spoken(context, label) for label in look.solo))
         text = words.say("Solo: {names}", names=names)
     else:
         text = ""
@@ -153,8 +154,8 @@ def look_in_words(look: look_masks.Look) -> str:
     return text
 
 
-def _draw_look(pen: _Pen, look: look_masks.Look, x: float, y: float) -> float:
-    text, unit = pen.cut(look_in_words(look), 420 * pen.scale), pen.scale
+def _draw_look(pen: _Pen, sentence: str, x: float, y: float) -> float:
+    text, unit = pen.cut(sentence, 420 * pen.scale), pen.scale
     pen.box(x - 10 * unit, y - 8 * unit, pen.width(text) + 20 * unit, 26 * unit, _ALERT)
     pen.text(text, x, y)
     return y + 34 * unit
@@ -172,15 +173,13 @@ def _draw_graph(pen: _Pen, context: Context, rig: ArmatureObject, x: float, y: f
     high, gap, wide = 38 * unit, 6 * unit, 190 * unit
     total = max(len(rows), 1) * (high + gap)
     left = (x, y + total / 2 - high / 2)
-    _draw_node(
-        pen, *left, wide, high, present.name_of(now.live, control), "", float(now.raw[control])
-    )
+    _draw_node(pen, *left, wide, high, spoken(context, label), "", float(now.raw[control]))
     for number, part in enumerate(rows):
         at = (x + wide + 60 * unit, y + total - (number + 1) * (high + gap))
         colour = _ON if part.value else _LINE
         pen.line((left[0] + wide, left[1] + high / 2), (at[0], at[1] + high / 2), colour)
-        others = ", ".join(f"{name} {value:.2f}" for name, value in part.others)
-        _draw_node(pen, *at, wide * 1.4, high, part.name, others, part.value)
+        others = ", ".join(f"{spoken(context, name)} {value:.2f}" for name, value in part.others)
+        _draw_node(pen, *at, wide * 1.4, high, spoken(context, part.name), others, part.value)
     more = len(found) - len(rows)
     if more > 0 or not found:
         text = words.say("and {count} more", count=more) if found else words.say("No correctives.")

@@ -13,6 +13,7 @@ from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, face_controls, face_rig
 from .overlay import look_in_words
 from .properties import choices
+from .spoken import spoken, title
 
 _ROWS = 10  # of a list
 _soon: list[bool] = []  # whether the strongest correctives are asked for, a moment after a change
@@ -31,10 +32,10 @@ class RISORIUS_PT_why(FaceOnlyPanel, Panel):
             return
         look = look_masks.of(rig)
         if not look.is_whole:
-            _draw_left_out(layout, look)
+            _draw_left_out(layout, context, look)
         _draw_mutes(layout, look)
         _draw_heat(layout, rig, context)
-        _draw_vertex(layout, rig)
+        _draw_vertex(layout, context, rig)
         header, body = layout.panel("RISORIUS_PT_why_control", default_closed=True)
         header.label(text="A Control and Its Correctives", text_ctxt=words.CONTEXT)
         if body is not None:
@@ -42,13 +43,13 @@ class RISORIUS_PT_why(FaceOnlyPanel, Panel):
         header, body = layout.panel("RISORIUS_PT_why_strongest", default_closed=True)
         header.label(text="Strongest Correctives", text_ctxt=words.CONTEXT)
         if body is not None:
-            _draw_strongest(body, rig)
+            _draw_strongest(body, context, rig)
 
 
-def _draw_left_out(layout: UILayout, look: look_masks.Look) -> None:
+def _draw_left_out(layout: UILayout, context: Context, look: look_masks.Look) -> None:
     box = layout.box()
     box.alert = True
-    words.write(box, look_in_words(look), "ERROR")
+    words.write(box, look_in_words(context, look), "ERROR")
     box.alert = False
     box.operator("risorius.show_all", icon="LOOP_BACK")
     row = box.row()
@@ -71,21 +72,21 @@ def _draw_heat(layout: UILayout, rig: ArmatureObject, context: Context) -> None:
     row = column.row(align=True)
     on = shown is not None and shown.kind == "POSE"
     row.operator(
-        "risorius.heat", text="From Neutral", icon="SHADING_RENDERED", depress=on
+        "risorius.heat", text="Heat Map from Neutral", icon="SHADING_RENDERED", depress=on
     ).kind = "POSE"
     if shown is not None:
         row.operator("risorius.heat", text="", icon="X").kind = "OFF"
-        words.show(column, words.say(heat.title(rig, shown)))
+        words.show(column, words.say(title(context, rig, shown)))
         words.show(column, words.say("0 (violet) to {most:.2f} mm (yellow)", most=shown.most))
     controls = face_controls(context)
     for place, layer in layers.ordered(controls):
         depress = shown is not None and (shown.kind, shown.what) == ("LAYER", str(place))
-        text = words.say("What {name} Adds", name=layer.name)
+        text = words.say("Heat Map of {name}", name=layer.name)
         button = column.operator("risorius.heat", text=text, depress=depress, translate=False)
         button.kind, button.what = "LAYER", str(place)
 
 
-def _draw_vertex(layout: UILayout, rig: ArmatureObject) -> None:
+def _draw_vertex(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
     layout.operator("risorius.why_vertex", icon="EYEDROPPER")
     found = causes.last(rig)
     if found is None:
@@ -94,7 +95,7 @@ def _draw_vertex(layout: UILayout, rig: ArmatureObject) -> None:
     head = words.say("Vertex {vertex}, {moved:.2f} mm", vertex=found.vertex, moved=found.moved)
     words.show(column, head)
     for cause in found.causes[:_ROWS]:
-        _draw_cause(column, cause, max(found.moved, found.causes[0].now))
+        _draw_cause(column, context, cause, max(found.moved, found.causes[0].now))
     _draw_more(column, len(found.causes) - _ROWS)
 
 
@@ -103,16 +104,16 @@ def _draw_more(layout: UILayout, count: int) -> None:
         words.show(layout, words.say("and {count} more", count=count))
 
 
-def _draw_cause(layout: UILayout, cause: causes.Cause, most: float) -> None:
+def _draw_cause(layout: UILayout, context: Context, cause: causes.Cause, most: float) -> None:
     """A line: name, millimetres, its heat map, it alone."""
-    row = layout.row(align=True)
+    row, name = layout.row(align=True), spoken(context, cause.name)
     if cause.now:
-        text = words.say("{name}  {now:.2f} mm", name=cause.name, now=cause.now)
+        text = words.say("{name}  {now:.2f} mm", name=name, now=cause.now)
     else:
-        text = words.say("{name}  could {full:.2f} mm", name=cause.name, full=cause.full)
+        text = words.say("{name}  could {full:.2f} mm", name=name, full=cause.full)
     row.progress(text=text, factor=min(cause.now / most, 1.0) if most else 0.0, translate=False)
     button = row.operator("risorius.heat", text="", icon="SHADING_RENDERED")
-    solo = row.operator("risorius.solo", text="", icon="SOLO_ON")
+    solo = row.operator("risorius.solo", text="", icon="RADIOBUT_ON")
     if cause.is_raw:
         button.kind, button.what = "CONTROL", cause.label
         solo.control = cause.label
@@ -131,7 +132,7 @@ def _draw_control(
         return
     row = layout.row(align=True)
     alone = look.solo == {chosen.control}
-    row.operator("risorius.solo", icon="SOLO_ON", depress=alone).control = chosen.control
+    row.operator("risorius.solo", icon="RADIOBUT_ON", depress=alone).control = chosen.control
     button = row.operator("risorius.heat", text="Reach", icon="SHADING_RENDERED")
     button.kind, button.what = "CONTROL", chosen.control
     layout.prop(chosen, "show_graph")
@@ -140,15 +141,15 @@ def _draw_control(
     if not found:
         words.show(column, words.say("No correctives."))
     for part in found[:_ROWS]:
-        others = ", ".join(f"{name} {value:.2f}" for name, value in part.others)
+        others = ", ".join(f"{spoken(context, name)} {value:.2f}" for name, value in part.others)
         row = column.row(align=True)
-        text = f"{part.name}  {part.value:.2f}"
+        text = f"{spoken(context, part.name)}  {part.value:.2f}"
         row.progress(text=text, factor=min(max(part.value, 0.0), 1.0), translate=False)
         words.show(column, f"   x {others}")
     _draw_more(column, len(found) - _ROWS)
 
 
-def _draw_strongest(layout: UILayout, rig: ArmatureObject) -> None:
+def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
     if not causes.is_known(rig):
         _ask_soon()
     fired = causes.known(rig)
@@ -156,7 +157,7 @@ def _draw_strongest(layout: UILayout, rig: ArmatureObject) -> None:
     if not fired:
         words.show(column, words.say("No corrective fires."))
     for cause in fired[:_ROWS]:
-        _draw_cause(column, cause, fired[0].now)
+        _draw_cause(column, context, cause, fired[0].now)
 
 
 def _ask_soon() -> None:

@@ -3,6 +3,6 @@
 
 from .build import build_sample
 from .people import PEOPLE, Person
-from .source import SourceError, is_fetched
+from .source import DATA_SIZE, SourceError, is_fetched
 
-__all__ = ["PEOPLE", "Person", "SourceError", "build_sample", "is_fetched"]
+__all__ = ["DATA_SIZE", "PEOPLE", "Person", "SourceError", "build_sample", "is_fetched"]

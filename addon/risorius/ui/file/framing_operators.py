@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Operators on what the view shows: the face whole, its outlines."""
+
+import bpy
+
+from ...scene.base import parts
+from ...scene.base.blender_types import current_context
+from ...scene.character import outlines
+from ..blender_types import Context, Operator, Result
+from ..common import FaceOperator, face_controls, face_rig
+from ..words import say
+from . import framing
+
+_keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+
+
+class RISORIUS_OT_frame_face(FaceOperator, Operator):
+    """Show the whole head in the view; outlines and the face board do not count"""
+
+    bl_idname = "risorius.frame_face"
+    bl_label = "Frame Face"
+    bl_options = {"REGISTER"}
+    whole_face = False
+    baked_too = True
+
+    instead: bpy.props.BoolProperty(
+        name="Instead of Frame Selected",
+        description="Only where outlines of a face are all that is selected",
+        options={"SKIP_SAVE"},
+    )
+
+    def execute(self, context: Context) -> Result:
+        if self.instead and not _only_outlines(context):
+            return {"PASS_THROUGH"}
+        if not framing.show_whole(context, face_rig(context)):
+            text = "No view can be moved: each one follows an object or the 3D cursor."
+            self.report({"WARNING"}, say(text))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
+def _only_outlines(context: Context) -> bool:
+    """Whether the control bones of a face are selected, or its armatures, and nothing else."""
+    rig = face_rig(context)
+    controls = parts.controls_of(rig)
+    if context.mode == "POSE":
+        bones = context.selected_pose_bones or []
+        return bool(bones) and all(b.id_data == controls and parts.PART in b.bone for b in bones)
+    return bool(context.selected_objects) and set(context.selected_objects) <= {rig, controls}
+
+
+class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
+    """Hide the outlines of head, neck and eyes, or show them again; keys stay in the editors"""
+
+    bl_idname = "risorius.hide_outlines"
+    bl_label = "Hide Outlines"
+    baked_too = True
+
+    hide: bpy.props.BoolProperty(name="Hide", default=True, options={"SKIP_SAVE"})
+
+    def execute(self, context: Context) -> Result:
+        controls = face_controls(context)
+        if self.hide:
+            outlines.hide(controls)
+        else:
+            outlines.show(controls)
+        return {"FINISHED"}
+
+
+def register() -> None:
+    """Let the key of Frame Selected show the face where its outlines are selected."""
+    config = current_context().window_manager.keyconfigs.addon
+    if config is None:
+        return  # in the background
+    keymap = config.keymaps.new("3D View", space_type="VIEW_3D")
+    item = keymap.keymap_items.new(RISORIUS_OT_frame_face.bl_idname, "NUMPAD_PERIOD", "PRESS")
+    item.properties.instead = True  # pyright: ignore  each operator has its own
+    _keys.append((keymap, item))
+
+
+def unregister() -> None:
+    """Take the key back."""
+    while _keys:
+        keymap, item = _keys.pop()
+        keymap.keymap_items.remove(item)
+
+
+CLASSES = (RISORIUS_OT_frame_face, RISORIUS_OT_hide_outlines)

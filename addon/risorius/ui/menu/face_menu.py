@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The menu Face of the 3D view's header, through which Blender's search finds all of it."""
+
+import bpy
+
+from ... import native
+from ...scene.animation import tweaks
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import outlines
+from ..blender_types import Context, Icon, Menu, UILayout
+from ..common import active_controls
+from . import entries
+
+_MODES = {"OBJECT", "POSE"}  # in edit mode Blender has a menu Face of its own
+_PARTS: tuple[tuple[type[Menu], Icon], ...] = (
+    (entries.RISORIUS_MT_face_keys, "KEYINGSET"),
+    (entries.RISORIUS_MT_face_sides, "MOD_MIRROR"),
+    (entries.RISORIUS_MT_face_eyes, "HIDE_OFF"),
+    (entries.RISORIUS_MT_face_drag, "VIEW_PAN"),
+    (entries.RISORIUS_MT_face_board, "MESH_GRID"),
+    (entries.RISORIUS_MT_face_layers, "RENDERLAYERS"),
+    (entries.RISORIUS_MT_face_why, "QUESTION"),
+)
+
+
+class RISORIUS_MT_face(Menu):
+    bl_idname = "RISORIUS_MT_face"
+    bl_label = "Face"
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.operator_context = "INVOKE_REGION_WIN"
+        if native.problem():  # only what may mend it is of use
+            layout.menu(entries.RISORIUS_MT_face_about.bl_idname)
+            return
+        layout.operator("risorius.frame_face", icon="ZOOM_SELECTED").instead = False
+        controls = active_controls(context)
+        hidden = controls is not None and outlines.are_hidden(controls)
+        text = "Show Outlines" if hidden else "Hide Outlines"
+        layout.operator("risorius.hide_outlines", text=text).hide = not hidden
+        layout.separator()
+        _draw_pose(layout, controls)
+        layout.separator()
+        for menu, icon in _PARTS:
+            layout.menu(menu.bl_idname, icon=icon)
+        layout.separator()
+        layout.menu(entries.RISORIUS_MT_face_import.bl_idname, icon="IMPORT")
+        layout.menu(entries.RISORIUS_MT_face_out.bl_idname, icon="EXPORT")
+        layout.separator()
+        layout.menu(entries.RISORIUS_MT_face_character.bl_idname, icon="USER")
+        layout.operator("risorius.add_studio", icon="LIGHT_AREA")
+        layout.menu(entries.RISORIUS_MT_face_about.bl_idname, icon="BLANK1")
+
+
+def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
+    """What the hand does most."""
+    layout.operator("risorius.reset", icon="LOOP_BACK").region = ""
+    layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
+    layout.menu("RISORIUS_MT_expressions", icon="MONKEY")
+    tweaked = controls is not None and tweaks.of(controls) is not None
+    text = "End Tweak" if tweaked else "Tweak over a Range"
+    layout.operator("risorius.tweak", text=text, icon="MOD_TIME").enable = not tweaked
+    layout.separator()
+    layout.operator("risorius.copy_pose", icon="COPYDOWN").region = ""
+    layout.operator("risorius.paste_pose", icon="PASTEDOWN").flipped = False
+    layout.operator(
+        "risorius.paste_pose", text="Paste Face Flipped", icon="PASTEFLIPDOWN"
+    ).flipped = True
+
+
+def draw_header(self: Menu, context: Context) -> None:
+    """The menu's name in the header. Args: self, context  of the header's menus."""
+    if context.mode in _MODES:
+        self.layout.menu(RISORIUS_MT_face.bl_idname)
+
+
+def register() -> None:
+    """Put the menu behind those of Blender."""
+    bpy.types.VIEW3D_MT_editor_menus.append(draw_header)
+
+
+def unregister() -> None:
+    """Take it away."""
+    bpy.types.VIEW3D_MT_editor_menus.remove(draw_header)
+
+
+CLASSES = (RISORIUS_MT_face,)

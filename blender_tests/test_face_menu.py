@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The menu Face of the header: Blender's search finds what it leads to, and nothing else."""
+
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from support import scene
+from support.layout import Recorder
+
+# Of a thing that only its panel, list or handle can name, or a step of something that is open.
+ELSEWHERE = {
+    *("apply_pose_asset", "blend_pose_asset", "blend_expression", "delete_expression"),
+    *("rename_expression", "star_expression", "update_expression", "render_thumbnails"),
+    *("save_expression", "favourite", "hide_hints", "shortcut", "install_speech"),
+    *("layer_add", "layer_move", "unfire", "fire", "solo", "mask_renders", "test_channel"),
+    *("drag", "drag_hover", "pin", "select_handle", "paste_pose_flipped"),
+    *("live_subject", "live_finish", "live_discard", "live_neutral", "learn_range_live"),
+    *("mix_add", "mix_add_scene", "mix_remove", "mix_preview", "mix_write"),
+    *("forget_range", "load_range", "save_range", "add_character", "set_lod"),
+    *("set_lod_by_distance", "set_shape_mode", "set_strands", "reset_board", "select_board"),
+    *("lead", "remove_board"),
+}
+
+
+class Menus(Recorder):
+    """Follows menus into menus, as Blender's search does."""
+
+    def __init__(self, top=None):
+        super().__init__(top)
+        if top is None:
+            object.__setattr__(self, "paths", [])
+
+    def menu(self, name, text="", icon="NONE", **_options):
+        kind = getattr(bpy.types, name)
+        below = Menus()
+        kind.draw(SimpleNamespace(layout=below), bpy.context)
+        title = text or kind.bl_label
+        self.operators.extend(below.operators)
+        self._top.paths.extend(f"{title} > {path}" for path in below.paths)
+
+    def operator(self, name, text="", **options):
+        kind = super().operator(name, text, **options)
+        module, _, last = name.partition(".")
+        title = text or getattr(getattr(bpy.ops, module), last).get_rna_type().name
+        self._top.paths.append(title)
+        return kind
+
+    def operator_enum(self, name, _property, **_options):
+        self.operator(name)
+
+
+def found():
+    """What the header leads to: paths as the search shows them, and names of operators."""
+    layout = Menus()
+    bpy.types.RISORIUS_MT_face.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout.paths, {name.partition(".")[2] for name in layout.operators}
+
+
+def is_in_header():
+    """Whether the header shows the menu now."""
+    layout = Menus()
+    draw = scene.submodule("ui.menu.face_menu").draw_header
+    assert draw in bpy.types.VIEW3D_MT_editor_menus._dyn_ui_initialize()
+    draw(SimpleNamespace(layout=layout), bpy.context)
+    return bool(layout.paths)
+
+
+@pytest.fixture
+def rig(dna_file):
+    return scene.load(dna_file)
+
+
+def test_search_finds_the_face_by_the_words_of_animators(rig):
+    paths, operators = found()
+    for words in (
+        *("risorius", "blink", "breakdown", "key all", "tweak over", "frame face", "reset"),
+        *("heat map", "mirror", "drag", "board", "speak", "import animation", "bake", "export"),
+        *("expressions", "layer", "live capture", "eyes follow", "copy left to right"),
+    ):
+        assert any(words in path.lower() for path in paths), words
+    assert "Keys > Key All" in paths
+    ours = {name for name in dir(bpy.ops.risorius) if not name.startswith("_")}
+    assert ours - operators - ELSEWHERE == set()
+    assert ELSEWHERE - ours == set()
+    for name in operators & ours:  # or the search would leave them out
+        assert "INTERNAL" not in getattr(bpy.ops.risorius, name).bl_options, name
+
+
+def test_the_menu_stands_in_object_and_pose_mode_and_without_a_face(dna_file):
+    assert is_in_header()
+    assert "Character > Add a Face > Face" in found()[0]
+    rig = scene.load(dna_file)
+    controls = scene.controls(rig)
+    bpy.context.view_layer.objects.active = controls
+    bpy.ops.object.mode_set(mode="POSE")
+    assert is_in_header()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.objects.active = scene.meshes(rig)[0]
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not is_in_header()  # Blender's own menu Face stands there
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def test_without_the_native_module_the_menu_leads_to_the_preferences(monkeypatch):
+    menu = scene.submodule("ui.menu.face_menu")
+    monkeypatch.setattr(menu.native, "problem", lambda: "It is missing.")
+    assert "Risorius > Preferences" in found()[0]
+    assert "reset" not in found()[1]

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Outlines of the control bones: beside the face, hidden without hiding keys, never in a scene."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+from support import scene
+
+
+@pytest.fixture
+def rig(dna_file):
+    return scene.load(dna_file)
+
+
+def outline(controls, name):
+    """float64[V, 3]: the corners of a bone's outline as Blender draws them, in world space."""
+    bone = controls.pose.bones[name]
+    size = [scale * bone.bone.length for scale in bone.custom_shape_scale_xyz]
+    own = Matrix.LocRotScale(bone.custom_shape_translation, bone.custom_shape_rotation_euler, size)
+    place = controls.matrix_world @ bone.matrix @ own
+    return np.array([place @ vertex.co for vertex in bone.custom_shape.data.vertices])
+
+
+def shapes(controls):
+    return [bone.custom_shape for bone in controls.pose.bones]
+
+
+def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(rig):
+    controls = scene.controls(rig)
+    left, right = (np.array(controls.data.bones[f"eye_{s}"].head_local) for s in "LR")
+    apart = abs(left[0] - right[0])
+    target = outline(controls, "eyes")
+    assert np.ptp(target[:, 0]) < apart  # it stands straight ahead, between the eyes
+    skin = np.concatenate([scene.evaluated(item) for item in scene.meshes(rig).values()])
+    low, high = skin.min(axis=0), skin.max(axis=0)
+    room = 0.75 * (high - low).max()
+    for name in ("head", "neck", "eye_L", "eye_R", "face"):
+        drawn = outline(controls, name)
+        for eye in (left, right):
+            over = np.all(drawn[:, ::2].min(axis=0) < eye[::2]) and np.all(
+                drawn[:, ::2].max(axis=0) > eye[::2]
+            )
+            assert not over, name
+        assert np.all(np.abs(drawn - (low + high) / 2) < room + np.ptp(drawn, axis=0)), name
+    sides = [outline(controls, f"eye_{side}")[:, 0].mean() for side in "LR"]
+    assert (sides[0] - sides[1]) * (left[0] - right[0]) > 0  # each on the side of its eye
+
+
+def test_appended_outlines_are_not_left_in_the_scene(rig, tmp_path):
+    name, path = scene.controls(rig).name, tmp_path / "face.blend"
+    bpy.ops.risorius.add_board()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.append(directory=f"{path}/Object", filename=rig_name(path))
+    bpy.context.view_layer.update()
+    controls = bpy.data.objects[name]
+    assert controls.users_scene
+    assert len(shapes(controls)) > 6
+    assert not [shape.name for shape in shapes(controls) if shape.users_collection]
+    own = controls.pose.bones["head"].custom_shape  # somebody wants to draw another one
+    bpy.context.scene.collection.objects.link(own)
+    bpy.context.view_layer.update()
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("new", None))
+    bpy.context.view_layer.update()
+    assert own.users_collection
+
+
+def rig_name(path):
+    with bpy.data.libraries.load(str(path)) as (held, _):
+        return next(name for name in held.objects if name.endswith("_rig"))
+
+
+def test_hidden_outlines_leave_bones_and_sizes_as_they_were(rig):
+    controls = scene.controls(rig)
+    controls.pose.bones["neck"].custom_shape_scale_xyz = (3.0, 2.0, 1.0)
+    before = {bone.name: bone.custom_shape_scale_xyz[:] for bone in controls.pose.bones}
+    assert bpy.ops.risorius.hide_outlines() == {"FINISHED"}
+    bpy.ops.risorius.hide_outlines()  # twice: what was remembered is not lost
+    for bone in controls.pose.bones:
+        assert not bone.bone.hide
+        assert np.ptp(outline(controls, bone.name), axis=0).max() < 1e-6
+    bpy.ops.risorius.hide_outlines(hide=False)
+    assert {b.name: b.custom_shape_scale_xyz[:] for b in controls.pose.bones} == before
+    bpy.ops.risorius.hide_outlines()
+    controls.pose.bones["neck"].custom_shape_scale_xyz = (5.0, 5.0, 5.0)
+    bpy.ops.risorius.hide_outlines(hide=False)
+    assert controls.pose.bones["neck"].custom_shape_scale_xyz[:] == (5.0, 5.0, 5.0)
+
+
+def test_the_key_of_frame_selected_shows_the_face_where_only_outlines_are_selected(rig):
+    controls, item = scene.controls(rig), bpy.data.objects.new("lamp", None)
+    bpy.context.scene.collection.objects.link(item)
+    bpy.context.view_layer.update()
+
+    def pressed(*selected):
+        for thing in bpy.context.view_layer.objects:
+            thing.select_set(thing in selected)
+        bpy.context.view_layer.objects.active = selected[0]
+        return bpy.ops.risorius.frame_face(instead=True)
+
+    assert pressed(controls) == {"FINISHED"}
+    assert pressed(controls, item) == {"PASS_THROUGH"}  # as Blender does it
+    assert pressed(controls, rig) == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.pose.select_all(action="SELECT")
+    assert bpy.ops.risorius.frame_face(instead=True) == {"FINISHED"}
+    bpy.ops.pose.select_all(action="DESELECT")
+    assert bpy.ops.risorius.frame_face(instead=True) == {"PASS_THROUGH"}
