@@ -71,8 +71,13 @@ def follows(rig, was, offset, share=0.01, vertex=VERTEX):
 def test_a_point_goes_where_it_is_dragged(rig, dna_file):
     offset, was = reach(rig, dna_file), place(rig)
     assert np.linalg.norm(offset) > 1e-3
-    assert drag(offset) == {"FINISHED"}
-    assert follows(rig, was, offset)
+    moved = {}
+    for method, share in (("NEAR", 0.05), ("LEAST_SQUARES", 0.01)):
+        bpy.ops.risorius.reset()
+        assert drag(offset, method=method) == {"FINISHED"}
+        assert follows(rig, was, offset, share)
+        moved[method] = [name for name, value in sliders(rig).items() if value]
+    assert len(moved["NEAR"]) <= 3 < len(moved["LEAST_SQUARES"])
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
 
@@ -110,7 +115,7 @@ def test_a_turned_head_on_a_moved_face_drags_right(rig, dna_file):
     offset = place(rig) - was  # the same pose, seen on the turned head
     scene.set_controls(rig, **dict.fromkeys(POSE, 0.0))
     assert follows(rig, was, np.zeros(3) + 1e-9, share=1e3)
-    assert drag(offset) == {"FINISHED"}
+    assert drag(offset, method="LEAST_SQUARES") == {"FINISHED"}
     assert follows(rig, was, offset)
 
 
@@ -297,7 +302,7 @@ def test_only_sliders_of_the_region(rig, dna_file):
 def test_a_pin_holds_and_is_saved(rig, dna_file, tmp_path):
     held = 75
     offset, was = reach(rig, dna_file), place(rig, held)
-    drag(offset)
+    drag(offset, method="LEAST_SQUARES")
     loose = np.linalg.norm(place(rig, held) - was)
     bpy.ops.risorius.reset()
     assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held) == {"FINISHED"}
@@ -306,7 +311,10 @@ def test_a_pin_holds_and_is_saved(rig, dna_file, tmp_path):
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held]
     drag(offset)
-    assert np.linalg.norm(place(rig, held) - was) < 0.75 * loose
+    few = np.linalg.norm(place(rig, held) - was)
+    bpy.ops.risorius.reset()
+    drag(offset, method="LEAST_SQUARES")
+    assert max(few, np.linalg.norm(place(rig, held) - was)) < 0.8 * loose
     assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held + 3) == {"FINISHED"}
     assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held, HEAD, held + 3]
     for vertex in (held, held + 3):  # and out again
@@ -356,7 +364,7 @@ def test_modifiers_above_that_make_other_vertices(rig, dna_file):
     offset, was = reach(rig, dna_file), place(rig)
     head.modifiers.new("Smooth", "SUBSURF").levels = 1
     scene.update(head)
-    assert drag(offset) == {"FINISHED"}
+    assert drag(offset, method="LEAST_SQUARES") == {"FINISHED"}
     head.modifiers.remove(head.modifiers["Smooth"])
     scene.update(head)
     assert follows(rig, was, offset)
@@ -467,7 +475,7 @@ def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
     moved = {name.removeprefix(PREFIX): v for name, v in after.items()}
     assert "mouthLeft" not in moved
     assert "mouthRight" not in moved
-    assert len(moved) > 2
+    assert 2 <= len(moved) <= 4  # a pair or two
     mirrored = scene.submodule("native").regions().mirrored
     for name, value in moved.items():
         assert moved[mirrored(name)] == pytest.approx(value, abs=1e-6), name

@@ -12,11 +12,11 @@ the beginning of a pose and opened by a click; the last lines have it with all o
 as they are for one who has just used them. Pixels are those that
 the pointer travels, on the layouts of the add-on: sliders of 75 or 150 pixels in rows of 22 below
 headings that are opened by a click, a board 285 pixels high, a head of 1.25 pixels a millimetre.
-A slider or handle is set to the pixel. A drag is one of the add-on's: least squares on the screen
-(both axes, depth free) or, with a key held, one slider alone, symmetric where the pose is. Dragging
-ends when a tenth of the way is left, at as many drags as sliders are needed, or when no drag brings
-a twentieth of what is left. Error: root of the mean square over vertices that the pose moves by
-0.1 mm, in mm; *way* is what it is at rest.
+A slider or handle is set to the pixel. A drag is one of the add-on's: few sliders, on the screen
+(both axes, depth free), or, with a key held, one slider alone, symmetric where the pose is.
+Dragging ends when a tenth of the way is left, at as many drags as sliders are needed, or when no
+drag brings a twentieth of what is left. Error: root of the mean square over vertices that the pose
+moves by 0.1 mm, in mm; *way* is what it is at rest.
 """
 
 from __future__ import annotations
@@ -273,7 +273,7 @@ def solutions(face, raw, vertex, wanted, mirrored):
     axes = np.tile(face.screen, (len(points), 1, 1))
     solved = risorius.solve_drag(
         face.surface, raw, points, targets, axes=axes, free=free, ease=ease, partners=partners,
-        opposites=face.opposites,
+        opposites=face.opposites, method="sparse",
     )  # fmt: skip
     yield np.asarray(solved.raw, float), 0  # no key held
     alone = risorius.best_controls(

@@ -6,7 +6,9 @@ import math
 import numpy as np
 import pytest
 import risorius
+from risorius._native import descend
 from risorius.solving.clip import CancelledError
+from risorius.solving.sparse import cheapest_change
 from skin_oracle import skinned, small_face
 
 JAW, LEFT, RIGHT, PUFF, TWIN, IDLE, WIDEN = range(7)
@@ -290,6 +292,71 @@ def test_of_two_that_do_nearly_the_same_both_move_where_one_misses():
     assert np.sqrt(1 - cosine**2) > 0.04
     assert solved.raw[TWIN] > 0.4
     assert drag(raw(jaw=0.5))[0].raw[TWIN] < 1e-3
+
+
+def test_a_sparse_drag_moves_few_and_arrives(face):
+    """Along two axes two controls arrive; least squares spread the way over all that help."""
+    surface, vertex = face[1], 14 * 5 + 6
+    axes = np.eye(3)[None, 1:]
+    target = surface.positions(raw(left=0.5, jaw=0.2), 0, [vertex])
+    way = np.linalg.norm((target - surface.positions(raw(), 0, [vertex]))[0, 1:])
+    drag = {"axes": axes, "opposites": [(LEFT, PUFF)]}
+    exact = risorius.solve_drag(surface, raw(), [(0, vertex)], target, **drag)
+    few = risorius.solve_drag(surface, raw(), [(0, vertex)], target, method="sparse", **drag)
+    assert (few.raw > 0).sum() <= 2 < (exact.raw > 1e-4).sum()
+    assert few.error < 0.03 * way
+    assert ((few.raw >= 0) & (few.raw <= 1)).all()
+    assert min(few.raw[LEFT], few.raw[PUFF]) == 0
+    pair = risorius.solve_drag(
+        surface, raw(), [(0, vertex)], target, method="sparse", partners=PARTNERS, axes=axes
+    )
+    assert pair.raw[LEFT] == pair.raw[RIGHT] > 0.1
+
+
+def test_a_sparse_drag_leaves_what_belongs_elsewhere(face):
+    surface, vertex = face[1], 14 * 3 + 5
+    target = surface.positions(raw(jaw=0.4), 0, [vertex])
+    ease = np.where(np.arange(7) == JAW, 0.001, 1.0)  # the twin does the same
+    given = {"ease": ease, "method": "sparse"}
+    near = risorius.solve_drag(surface, raw(), [(0, vertex)], target, **given)
+    assert near.raw[JAW] == 0 < near.raw[TWIN]
+    alone = np.isin(np.arange(7), [JAW, IDLE, PUFF])  # what reaches nothing asks the jaw
+    helped = risorius.solve_drag(surface, raw(), [(0, vertex)], target, free=alone, **given)
+    assert helped.raw[JAW] == pytest.approx(0.4, abs=0.02)
+
+
+def test_a_sparse_drag_is_continuous_in_its_target(face):
+    surface, vertex = face[1], 14 * 5 + 6
+    start = surface.positions(raw(), 0, [vertex])[0].astype(float)
+
+    def drag(turn):
+        target = start + 0.1 * np.array([0, np.cos(turn), np.sin(turn)])
+        given = {"axes": np.eye(3)[None, 1:], "method": "sparse"}
+        return risorius.solve_drag(surface, raw(), [(0, vertex)], [target], **given).raw
+
+    turns = np.linspace(0, np.pi, 90)
+    found = [drag(turn) for turn in turns]
+    assert np.abs(np.diff(found, axis=0)).max() < 0.15
+    assert np.ptp(found, axis=0).max() > 0.2
+    np.testing.assert_array_equal(drag(turns[40]), found[40])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_cheapest_change_is_the_cheapest(seed):
+    """Against the penalised problem by coordinate descent, at the price where they miss alike."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(3, 12)), rng.normal(size=3) * 2
+    low, high = -rng.uniform(0, 1, 12), rng.uniform(0.1, 1, 12)
+    price = rng.uniform(1, 2, 12)
+    x = cheapest_change(a, b, low, high, price, np.zeros(12, bool), 0.2, 0.2)
+    assert ((x >= low) & (x <= high)).all()
+    missing = np.linalg.norm(a @ x - b)
+    below, above = 0.0, 10.0
+    for _ in range(50):
+        half = (below + above) / 2
+        other = descend(a.T @ a, a.T @ b, low, high, np.zeros(12), half * price, np.zeros(12), 1e-9)
+        below, above = (below, half) if np.linalg.norm(a @ other - b) > missing else (half, above)
+    assert price @ np.abs(x) == pytest.approx(price @ np.abs(other), rel=1e-3)
 
 
 def test_what_is_not_easy_helps_where_others_do_not_reach(face):

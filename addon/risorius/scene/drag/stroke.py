@@ -39,8 +39,8 @@ class Options:
 
     Attributes:
         symmetric: the mirrored point goes the mirrored way.
-        method: "near", by what belongs to the place of the points, "least_squares", by all
-            sliders, or "transpose".
+        method: "near", by few sliders, those that belong to the place of the points before others,
+            "least_squares", by all sliders, or "transpose".
         single: only the one control that does it best moves; with `symmetric` its partner too.
         choice: which one: 0 is the best, 1 the next.
         region: only controls of the region of the point.
@@ -218,11 +218,12 @@ class Stroke:
         anchors = self._of()
         goal, axes = self._goal(anchors, target, view)
         near = self.options.method == "near"
-        how = {"ease": self._ease()} if near else {"method": self.options.method}
+        method = "sparse" if near else self.options.method
         solved = native.module().solve_drag(
             self.skin.surface, self.state.seen, anchors.points, goal, axes=axes, free=free,
             lowest=self.state.low, highest=self.state.high, opposites=self._opposites,
-            partners=self._partners if self._is_symmetric else None, **how,
+            partners=self._partners if self._is_symmetric else None, method=method,
+            ease=self._ease() if near else None,
         )  # fmt: skip
         moved = solved.positions[0].astype(np.float64) - anchors.rest[0]
         return solved.raw, anchors.world[0] + anchors.maps[0] @ moved

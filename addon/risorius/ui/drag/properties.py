@@ -13,10 +13,14 @@ METHODS = (
     (
         "NEAR",
         "Near",
-        "The smallest change of the sliders that belong to this place: a brow turns no eye. "
+        "Few sliders, of those that belong to this place: a brow turns no eye. "
         "Where they do not reach, the point lags",
     ),
-    ("LEAST_SQUARES", "Exact", "The smallest change of all sliders that brings the point there"),
+    (
+        "LEAST_SQUARES",
+        "Exact",
+        "The smallest change of all sliders that brings the point there: many move a little",
+    ),
     (
         "TRANSPOSE",
         "Gentle",

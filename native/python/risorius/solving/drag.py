@@ -20,9 +20,10 @@ from .._native import Probe, least_change
 from ..base.errors import ArgumentError
 from ..base.given import MOST, checked, finite
 from ..base.given import whole as whole_number
+from .sparse import cheapest_change
 from .surface import Doubles, Floats, Surface, limits, numbers, vector, wholes
 
-METHODS = ("least_squares", "transpose")
+METHODS = ("least_squares", "transpose", "sparse")
 LOCAL = 0.12
 """A control that does less here, of what it does where it does most, than this share of what the
 most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
@@ -36,6 +37,15 @@ _ON = 1e-6
 # belong elsewhere have to bring points nearer that stay out of reach.
 _WORTH = 0.02
 _GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
+# Of a sparse drag: what of the way, and how many mm, may be missing for the sake of fewer controls,
+# and how much nearer those that belong elsewhere have to bring the points together.
+_MISSING, _MISSING_MM = 0.02, 0.6
+_HELP, _HELP_MM = 0.02, 1.3
+_DEAR = 100.0  # what those elsewhere cost: they come after all others
+# What a control has to do, of what the strongest could, to take part, and one of those elsewhere.
+_WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
+_STILL = 1e-4  # of a control: a look that changes less is the last
+_FREED = 4.0  # a control that was found has so much more room when all of them are fitted
 
 
 class Solved(NamedTuple):
@@ -65,6 +75,7 @@ class _Drag:
     high: Doubles  # [R]
     ease: Doubles  # [R]
     unknowns: _Unknowns
+    mm: float  # of the file's unit
 
     def held(self, controls: Sequence[int], at: Doubles) -> _Drag:
         """The same drag with some controls kept where they are."""
@@ -136,7 +147,9 @@ def _drag(
     # A pair is as ready as its readier half: the other half alone would hold both back.
     pair = easy.copy()
     pair[unknowns.first] = pair[unknowns.second] = unknowns.ease
-    return _Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, pair, unknowns)
+    return _Drag(
+        probe, loose, wanted, along, np.sqrt(weight), low, high, pair, unknowns, surface.mm
+    )
 
 
 @dataclass
@@ -147,6 +160,10 @@ class _Unknowns:
     second: npt.NDArray[np.int64]  # [U] their partners, themselves where they have none
     ease: Doubles  # [U]: of two partners that of the readier one
     scale: Doubles  # [U]: what a unit of an unknown changes each of its controls by
+
+    def alike(self) -> _Unknowns:
+        """The same, each as ready as the others."""
+        return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:
         """float64[m, U] of float64[m, R]"""
@@ -224,8 +241,11 @@ def solve_drag(
         opposites: pairs of controls of which one at most shall be on, as mouthLeft and mouthRight.
             A face whose halves differ finds a use for both at once, and nobody wants that. Two that
             are partners as well stay as they are.
-        method: "least_squares", or "transpose", which takes the controls that move the points
-            themselves by as much as they do so: surprises less far from the drag.
+        method: "least_squares"; "transpose", which takes the controls that move the points
+            themselves by as much as they do so: surprises less far from the drag; or "sparse", few
+            controls, about one for each direction that counts, which may leave some of the
+            way missing, 0.6 mm at most, and ask those that belong elsewhere (an ease below a tenth)
+            only where they bring the points noticeably nearer.
         smallest: how much a small change is worth, beside the reach of the strongest control; more
             gives up some of the target.
         rounds: how often at most the face is looked at anew on the way.
@@ -248,6 +268,8 @@ def solve_drag(
     def solve(drag: _Drag, start: Doubles) -> Doubles:
         if method == "transpose":
             return _transposed(drag, begin, rounds)
+        if method == "sparse":
+            return _sparsely(drag, begin, smallest, rounds)
         if not hard:
             return _least_squares(drag, begin, start, smallest, rounds)
         # The easy ones alone often do, and are few to look at.
@@ -261,7 +283,8 @@ def solve_drag(
 
     pairs = _pairs(opposites, len(begin))
     at = whole = _kept_apart(drag, begin, pairs, solve)
-    doubles, readier = _doubles(drag.held(hard, begin), begin)
+    # A sparse drag takes the cheaper of two that do the same by itself.
+    doubles, readier = _doubles(drag.held(hard, begin), begin) if method != "sparse" else ([], [])
     if doubles:
         at = _kept_apart(drag.held(doubles, begin), begin, pairs, solve)
         if (at[readier] >= drag.high[readier] - _ON).any():  # they have no more to give
@@ -375,6 +398,49 @@ def _least_squares(
         if gained <= _GAIN * max(float(worth), first):
             break
     return at
+
+
+def _sparsely(drag: _Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
+    """The cheapest change that comes near enough, then of the controls that it moves the best.
+
+    A control costs the root of how far it brings the points, by its ease: of several that go one
+    way a strong one is preferred to weak ones that go to their limits. The controls are found as
+    the face is at the begin, once: so they depend continuously on the targets.
+    """
+    units, eases = drag.unknowns.alike(), drag.unknowns.ease
+    drag = replace(drag, unknowns=units)
+    jacobian, missing = _seen_from(drag, begin, begin)
+    way, unit = float(np.linalg.norm(missing)), float(np.linalg.norm(drag.roots)) / drag.mm
+    low, high = units.limits(drag.low - begin, drag.high - begin)
+    elsewhere = eases < _HARD * eases.max()
+    far = np.linalg.norm(jacobian, axis=0)
+    reach = far * np.maximum(high, -low)
+    least = np.where(elsewhere, _WEAK_ELSEWHERE, _WEAK) * reach.max(initial=0.0)
+    some = np.flatnonzero(reach > least)
+    price = np.where(elsewhere, _DEAR, eases.max() / eases) * np.sqrt(far)
+    x = np.zeros(len(far))
+    x[some] = cheapest_change(
+        jacobian[:, some], missing, low[some], high[some], price[some], elsewhere[some],
+        min(_MISSING * way, _MISSING_MM * unit), min(_HELP * way, _HELP_MM * unit),
+    )  # fmt: skip
+    change = units.change(x, len(begin))
+    drag, at = drag.held([*map(int, np.flatnonzero(change == 0))], begin), begin + change
+    low, high = np.clip(_FREED * x, low, 0.0), np.clip(_FREED * x, 0.0, high)
+    ridge = max((smallest * float(far.max(initial=0.0))) ** 2, 1e-20)
+    for _ in range(max(1, rounds - 1)):
+        jacobian, missing = _seen_from(drag, begin, at)
+        was, x = x, least_change(jacobian, missing, low, high, ridge)
+        at = begin + units.change(x, len(begin))
+        if float(np.abs(x - was).max()) < _STILL:
+            break
+    return at
+
+
+def _seen_from(drag: _Drag, begin: Doubles, at: Doubles) -> tuple[Doubles, Doubles]:
+    """The derivatives at a pose, float64[m, U], and what changes from the begin have to give."""
+    jacobian = drag.unknowns.columns(drag.jacobian(at))
+    here = drag.unknowns.values(at - begin)
+    return jacobian, drag.residual(drag.positions(at)) + jacobian @ here
 
 
 def _transposed(drag: _Drag, at: Doubles, rounds: int) -> Doubles:

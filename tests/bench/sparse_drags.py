@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: MIT
+"""How many sliders a drag moves, how far from the pointer it ends, how pointed the skin becomes.
+
+    python tests/bench/sparse_drags.py man.dna
+
+One drag from rest of the point that moves furthest on the screen, to where it has to go: in each of
+the poses of posing_tasks.py, for 100 random points in a random pose of three sliders that move the
+point by 2 mm or more each, and for 100 random points pulled 4 to 21 pixels in any direction, which
+are often beyond what the face can do. Drags are those of the add-on: *Exact* (least squares), what
+*Near* was (least squares by ease) and *Near* (sparse). Counted are pairs of sliders, left and right
+as one, that change by 0.0001 or more; *extra* is how many more than the pose has. Pixels are those
+of posing_tasks.py, 1.25 a millimetre. *Needle*: of the displacement of the skin within 12 mm of the
+point, what eight rounds of averaging over neighbours take away, the most, beside how far the point
+moves; over the same of the artist's pose (of a pull: of the single best slider). Each cell is the
+median and the worst.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import posing_tasks as posing
+import risorius
+
+SEED, COUNT = 52, 100
+PATCH_MM, ROUNDS, TOUCHED = 12.0, 8, 1e-4
+METHODS = {
+    "Exact": {"method": "least_squares"},
+    "Near before": {"method": "least_squares", "ease": True},
+    "Near": {"method": "sparse", "ease": True},
+}
+
+
+@dataclass
+class Case:
+    """A drag from rest: vertices and where they go, the artist's pose or None."""
+
+    vertices: list[int]
+    targets: list[np.ndarray]
+    pose: np.ndarray | None
+    mirrored: bool = False
+
+
+class Skin(posing.Face):
+    """The head with its neighbours."""
+
+    def __init__(self, dna: risorius.Dna) -> None:
+        super().__init__(dna)
+        mesh = dna.meshes[self.mesh]
+        corners = np.asarray(mesh.layout_positions)[np.asarray(mesh.face_layouts)]
+        begins = np.asarray(mesh.face_offsets)
+        faces = [corners[a:b] for a, b in pairwise(begins)]
+        pairs = np.concatenate([np.stack([f, np.roll(f, 1)], axis=1) for f in faces])
+        self.edges = np.unique(np.concatenate([pairs, pairs[:, ::-1]]), axis=0)
+        self.degree = np.bincount(self.edges[:, 0], minlength=len(self.rest)).clip(1)[:, None]
+        self.pixels = posing.PIXELS_A_MM * self.mm
+
+    def needle(self, raw, vertex):
+        """How pointed the skin of a pose is at a vertex, beside how far it moves."""
+        moved = self.at(raw) - self.rest
+        smooth = moved
+        for _ in range(ROUNDS):
+            around = np.zeros_like(smooth)
+            np.add.at(around, self.edges[:, 0], smooth[self.edges[:, 1]])
+            smooth = (smooth + around / self.degree) / 2
+        near = np.linalg.norm(self.rest - self.rest[vertex], axis=1) * self.mm < PATCH_MM
+        rough = np.linalg.norm((moved - smooth)[near], axis=1).max()
+        return rough / max(1e-9, float(np.linalg.norm(moved[vertex])))
+
+    def pairs(self, raw):
+        """The sliders of a pose, left and right as one."""
+        return {min(int(i), int(self.partners[i])) for i in np.flatnonzero(np.abs(raw) > TOUCHED)}
+
+    def reachable(self):
+        """Vertices in front that some slider moves by 3 mm on the screen."""
+        far = np.zeros(len(self.rest))
+        for control in range(len(self.names)):
+            raw = np.eye(len(self.names))[control]
+            moved = (self.at(raw) - self.rest) @ self.screen.T
+            far = np.maximum(far, np.linalg.norm(moved, axis=1))
+        return np.flatnonzero(self.shown & (far * self.mm > 3))
+
+
+def tasks(face: Skin) -> Iterator[Case]:
+    """The poses of posing_tasks.py."""
+    for task in posing.TASKS.values():
+        goal = face.raw_of(task)
+        wanted, mirrored = face.at(goal), posing.is_mirrored(face, goal)
+        off = np.linalg.norm((wanted - face.rest) @ face.screen.T, axis=1) * face.shown
+        vertices = [int(off.argmax())]
+        side = face.surface.side
+        middle = face.middle[side]
+        if mirrored and abs(face.rest[vertices[0], side] - middle) * face.mm > 3:
+            flip = face.rest[vertices[0]].copy()
+            flip[side] = 2 * middle - flip[side]
+            vertices.append(int(np.linalg.norm(face.rest - flip, axis=1).argmin()))
+        yield Case(vertices, [wanted[v] for v in vertices], goal, mirrored)
+
+
+def poses(face: Skin, points: np.ndarray) -> Iterator[Case]:
+    """Random points in random poses of three sliders that move them."""
+    random, made = np.random.default_rng(SEED), 0
+    zero = np.zeros(len(face.names))
+    while made < COUNT:
+        vertex = int(random.choice(points))
+        reach = face.surface.jacobian(zero, face.mesh, np.array([vertex]))[0]
+        strong = np.flatnonzero(np.linalg.norm(reach, axis=0) * face.mm > 2)
+        if len(strong) < 3:
+            continue
+        goal = zero.copy()
+        goal[random.choice(strong, 3, replace=False)] = random.uniform(0.2, 0.9, 3)
+        target = face.at(goal)[vertex]
+        if np.linalg.norm(face.screen @ (target - face.rest[vertex])) * face.pixels >= 3:
+            made += 1
+            yield Case([vertex], [target], goal)
+
+
+def pulls(face: Skin, points: np.ndarray) -> Iterator[Case]:
+    """Random points pulled any way."""
+    random = np.random.default_rng(SEED)
+    for _ in range(COUNT):
+        vertex, turn = int(random.choice(points)), random.uniform(0, 2 * np.pi)
+        way = random.uniform(4, 21) / face.pixels * np.array([np.cos(turn), np.sin(turn)])
+        yield Case([vertex], [face.rest[vertex] + face.screen.T @ way], None)
+
+
+def drag(face: Skin, case: Case, method: str, ease: bool = False):
+    """The pose that a drag makes, and how many seconds it takes without the ease."""
+    zero = np.zeros(len(face.names))
+    reach = face.surface.jacobian(zero, face.mesh, np.array(case.vertices[:1]))
+    free = np.ones(len(zero), bool)
+    if case.mirrored:
+        free[[c for a, b in face.opposites if face.partners[a] == b for c in (a, b)]] = False
+    given = {
+        "axes": np.tile(face.screen, (len(case.vertices), 1, 1)),
+        "free": free,
+        "partners": face.partners if case.mirrored else None,
+        "opposites": face.opposites,
+        "ease": risorius.local_ease(face.surface, reach) if ease else None,
+    }
+    points = [(face.mesh, v) for v in case.vertices]
+    begin = time.perf_counter()
+    solved = risorius.solve_drag(face.surface, zero, points, case.targets, method=method, **given)
+    return np.asarray(solved.raw, float), time.perf_counter() - begin
+
+
+def measure(face: Skin, case: Case, how: dict) -> list[float]:
+    """Sliders, extra ones, pixels, needle over the artist's, milliseconds."""
+    raw, seconds = drag(face, case, **how)
+    vertex = case.vertices[0]
+    artist = case.pose
+    if artist is None:
+        artist = np.zeros(len(face.names))
+        best = risorius.best_controls(
+            face.surface, artist, (face.mesh, vertex), case.targets[0], axes=face.screen, count=1
+        )
+        for control, value, _left in best:
+            artist[control] = value
+    off = np.linalg.norm(face.screen @ (face.at(raw)[vertex] - case.targets[0])) * face.pixels
+    still = not artist.any() or not raw.any()
+    pointed = 1.0 if still else face.needle(raw, vertex) / face.needle(artist, vertex)
+    touched = len(face.pairs(raw))
+    extra = touched - len(face.pairs(case.pose)) if case.pose is not None else np.nan
+    return [touched, extra, float(off), pointed, 1e3 * seconds]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("face", type=Path)
+    face = Skin(risorius.load(parser.parse_args().face))
+    points = face.reachable()
+    print("| targets | drag | sliders | extra | px off | px above Exact | needle | ms |")
+    print("|---|---|---|---|---|---|---|---|")
+    sets = (("30 poses", tasks(face)), ("100 random poses", poses(face, points)))
+    for title, cases in (*sets, ("100 random pulls", pulls(face, points))):
+        every, exact = list(cases), None
+        for name, how in METHODS.items():
+            rows = np.array([measure(face, case, how) for case in every])
+            exact = rows[:, 2] if exact is None else exact
+            table = np.insert(rows, 3, rows[:, 2] - exact, axis=1)
+            cells = [
+                "" if np.isnan(column).any() else f"{np.median(column):.{d}f}, {column.max():.{d}f}"
+                for column, d in zip(table.T, (0, 0, 2, 2, 2, 1), strict=True)
+            ]
+            over = int((table[:, 3] > 2).sum())
+            print(f"| {title} | {name} | {' | '.join(cells)} |", flush=True)
+            if over:
+                print(f"(of these {over} are over 2 px above Exact)", flush=True)
+
+
+if __name__ == "__main__":
+    main()
