@@ -20,7 +20,7 @@ from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
 from ..character import armatures, runtime
-from . import curve_colours
+from . import curve_colours, shown_keys
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
 _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
@@ -251,6 +251,7 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
     if before is not None and before != action:
         before.use_fake_user = True
     compat.assign_action(data, action, compat.slot_for(action, controls))
+    shown_keys.show(controls, [c.data_path for c in compat.curves_for(action, controls)])
     return before if before != action else None
 
 

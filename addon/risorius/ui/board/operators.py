@@ -9,7 +9,7 @@ import bpy
 
 from ... import native
 from ...logic.base import names
-from ...scene.animation import board_keys
+from ...scene.animation import board_keys, shown_keys
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import board, board_bones, runtime
 from ...scene.frame import evaluate
@@ -112,6 +112,7 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
         if board.leads_face(rig):
             board_keys.switch(rig, by_board=False, with_keys=True)
         board_bones.remove(context, rig)
+        shown_keys.show_some(face_controls(context))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
