@@ -315,6 +315,21 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
     assert scene.face(blinking)["CTRL_expressions.eyeBlinkL"] == 0.0
 
 
+def test_a_blink_during_a_tweak_touches_no_key(blinking):
+    bpy.ops.risorius.blink()
+    before = {
+        c.data_path: [*k.co]
+        for c in scene.curves(scene.controls(blinking))
+        for k in c.keyframe_points
+    }
+    bpy.ops.risorius.tweak(first=10, last=30)
+    bpy.context.scene.frame_set(20)
+    assert bpy.ops.risorius.blink() == {"FINISHED"}
+    now = scene.curves(scene.controls(blinking))
+    assert {c.data_path: [*k.co] for c in now for k in c.keyframe_points} == before
+    assert [y.name for y in scene.controls(blinking).risorius_layers] == ["Blinks"]
+
+
 def test_a_blink_begins_and_ends_at_what_the_lids_show(blinking):
     bone, path = scene.face(blinking), 'pose.bones["face"]["CTRL_expressions.eyeBlinkL"]'
     for frame, value in ((10, 0.1), (22, 0.7), (30, 0.3)):

@@ -17,8 +17,8 @@ from ...logic.base.sentences import Sentence, told
 from ...logic.character import board_fit
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
-from ..character import armatures, board, board_bones, runtime
-from . import actions, clip_actions, shown_keys
+from ..character import armatures, board, board_bones, runtime, shown_keys
+from . import actions, clip_actions
 
 TOLERANCE = 5e-4  # how far a straight line between two keys may be from what was converted
 _NAMED = 4  # controls that a sentence on a loss names

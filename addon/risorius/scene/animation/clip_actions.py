@@ -19,8 +19,8 @@ from ...logic.animation import clip_units
 from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
-from ..character import armatures, runtime
-from . import curve_colours, shown_keys
+from ..character import armatures, runtime, shown_keys
+from . import curve_colours
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
 _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}

@@ -18,8 +18,8 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context
-from ..character import armatures, board, runtime
-from . import clip_actions, curve_colours, shown_keys, tweaks
+from ..character import armatures, board, runtime, shown_keys
+from . import clip_actions, curve_colours, tweaks
 
 if TYPE_CHECKING:
     from bpy.stub_internal.rna_enums import (

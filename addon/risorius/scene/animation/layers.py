@@ -13,7 +13,7 @@ from ... import native
 from ...logic.animation import layer_rules as logic
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
-from . import shown_keys
+from ..character import shown_keys
 from .layer_properties import REACTIONS, RISORIUS_PG_layer, RISORIUS_PG_reaction
 
 _KEY_SETTINGS = (

@@ -11,10 +11,10 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ... import native
-from ..animation import layer_mixing, layers, shown_keys
+from ..animation import layer_mixing, layers, tweak_guard
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
-from ..character import board, lods, rig_placement, runtime
+from ..character import board, lods, rig_placement, runtime, shown_keys
 from ..frame import (
     caches,
     channel_preview,
@@ -42,6 +42,9 @@ _state: dict[str, Any] = {
 def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
     timing.begin()
     caches.look()
+    if not _state["rendering"] and not native.problem():
+        for controls in filter(None, map(parts.controls_of, parts.rigs())):
+            tweak_guard.settle(controls)
     evaluate.before_frame(scene, _is_rendered())
 
 
@@ -158,14 +161,14 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
-    _note_keys(armatures, actions)
+    _note_keys(depsgraph.scene.frame_current_final, armatures, actions)
     return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
 
 
 def _note_keys(
-    armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
+    frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
 ) -> None:
-    """Look for keys that Blender's own operators gave to sliders."""
+    """Look for keys that Blender's own operators gave to sliders, and for sliders that moved."""
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         data = controls.animation_data if controls is not None else None
@@ -174,6 +177,8 @@ def _note_keys(
             action in actions or (action is None and controls in armatures)
         ):
             shown_keys.note_edit(controls)
+        if controls is not None and (action in actions or controls in armatures):
+            tweak_guard.note_edit(controls, frame, action in actions)
 
 
 def _concerned(
@@ -225,6 +230,7 @@ def _restored(*_arguments: object) -> None:
     lateness.forget()
     layer_mixing.forget()
     shown_keys.forget()
+    tweak_guard.forget()
     applied_transforms.forget()
     bone_edits.forget()
     causes.forget()

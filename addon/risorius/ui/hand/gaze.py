@@ -5,7 +5,7 @@
 
 import bpy
 
-from ...scene.animation import keying
+from ...scene.animation import keying, tweaks
 from ...scene.base import parts
 from ...scene.character import board, rig_placement, runtime
 from ...scene.frame import evaluate
@@ -122,8 +122,9 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
         blink = blinks.Blink(
             self.close, self.hold, self.open, self.strength, self.offset, self.sides
         )
+        above = self.kind == "LAYER" or tweaks.of(controls) is not None
         for frame in frames:
-            if self.kind == "LAYER":
+            if above:
                 blinks.add_to_layer(rig, frame, blink)
             else:
                 blinks.key(rig, frame, blink, keying.rules_of(context, auto=False, exact=True))

@@ -9,10 +9,11 @@ import bpy
 
 from ... import native
 from ...logic.base.errors import FaceError
-from ...scene.animation import curve_colours, keying, tweaks
+from ...scene.animation import curve_colours, keying, tweak_guard
 from ...scene.base import compat, parts
 from ...scene.frame import evaluate
 from ...scene.hand import between
+from ...scene.live import sessions
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
 from ..words import of_error, say
@@ -212,11 +213,16 @@ class RISORIUS_OT_tweak(FaceOperator, Operator):
 
     def execute(self, context: Context) -> Result:
         controls = face_controls(context)
+        if self.enable and sessions.of(controls) is not None:
+            self.report(
+                {"ERROR"}, say("Live capture moves the sliders of this face: stop it first.")
+            )
+            return {"CANCELLED"}
         try:
             if self.enable:
-                tweaks.begin(controls, self.first, self.last, self.fade)
+                tweak_guard.begin(controls, self.first, self.last, self.fade)
             else:
-                tweaks.end(controls)
+                tweak_guard.end(controls)
         except FaceError as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}

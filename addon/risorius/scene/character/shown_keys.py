@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context, current_context
-from ..character import armatures
+from . import armatures
 
 # Uid of a control armature -> uid of the action that it plays, and how many keys its sliders have.
 _counts: dict[int, tuple[int, int]] = {}
