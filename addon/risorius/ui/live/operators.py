@@ -250,7 +250,7 @@ def _finish(
         return False
     operator.report({"INFO"}, say(report.summary()))
     for note in report.notes:
-        operator.report({"WARNING"}, note)
+        operator.report({"WARNING"}, say(note))
     return True
 
 
