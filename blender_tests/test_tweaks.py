@@ -203,3 +203,16 @@ def test_with_linked_sides_both_are_tweaked(dna_file):
     press_i(rig, LEFT)
     assert [shown(rig, 20, n) for n in (LEFT, RIGHT)] == pytest.approx([0.4, 0.4], abs=1e-5)
     assert [shown(rig, 5, n) for n in (LEFT, RIGHT)] == pytest.approx([0.0, 0.0], abs=1e-5)
+
+
+def test_the_range_that_is_proposed_lies_around_the_frame(rig):
+    """All keys of a take are selected after an import: they say nothing."""
+    proposed = scene.submodule("ui.hand.operators").proposed_range
+    points = scene.curves(scene.controls(rig))[0].keyframe_points
+    for chosen, wanted in (((1, 15, 40), (8, 32)), ((15, 40), (15, 40)), ((15,), (8, 32))):
+        for point in points:
+            point.select_control_point = round(point.co.x) in chosen
+        assert proposed(bpy.context) == wanted
+    bpy.context.scene.use_preview_range = True
+    bpy.context.scene.frame_preview_start, bpy.context.scene.frame_preview_end = 12, 28
+    assert proposed(bpy.context) == (12, 28)
