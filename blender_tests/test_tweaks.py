@@ -4,6 +4,7 @@
 import bpy
 import pytest
 from support import scene
+from support.layout import drawn
 
 PREFIX = "CTRL_expressions."
 JAW, LEFT, RIGHT = "jawOpen", "mouthCornerPullL", "mouthCornerPullR"
@@ -216,3 +217,26 @@ def test_the_range_that_is_proposed_lies_around_the_frame(rig):
     bpy.context.scene.use_preview_range = True
     bpy.context.scene.frame_preview_start, bpy.context.scene.frame_preview_end = 12, 28
     assert proposed(bpy.context) == (12, 28)
+
+
+HOSTILE = (
+    "[]",
+    "{",
+    '{"first": "a", "last": 2, "fade": 0, "layer": "", "base": {}}',
+    '{"first": 1, "last": NaN, "fade": 0, "layer": "", "base": {}}',
+    '{"first": 1, "last": 2, "fade": 0, "layer": "", "base": {"x": "y"}}',
+    '{"first": 1, "last": 2, "fade": 0, "layer": "", "base": [], "places": 3}',
+    '{"first": 1, "last": 2, "fade": 0, "layer": "", "base": {}, "places": {"a": [1]}}',
+)
+
+
+def test_a_tweak_of_a_hostile_file_is_none(dna_file):
+    rig = scene.load(dna_file)
+    for count, text in enumerate(HOSTILE, 1):
+        scene.controls(rig)["risorius_tweak"] = text
+        scene.controls(rig)["risorius_tweak_kept"] = "text"
+        scene.set_controls(rig, jawOpen=0.4)
+        press_i(rig, frame=count)
+        go(rig, 30)
+        assert drawn(bpy.types.RISORIUS_PT_character).labels[0] == "Small", text
+        assert len(below(rig)) == count

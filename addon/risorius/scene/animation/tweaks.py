@@ -9,6 +9,7 @@ leads, the same holds for its handles.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
 
@@ -58,9 +59,22 @@ def of(controls: ArmatureObject) -> Tweak | None:
     if not isinstance(text, str):
         return None
     try:
-        return Tweak(**json.loads(text))
+        tweak = Tweak(**json.loads(text))
     except (ValueError, TypeError):
         return None
+    return tweak if _is_sound(tweak) else None
+
+
+def _is_sound(tweak: Tweak) -> bool:
+    """Whether a tweak that a file says to be on holds what it must."""
+    base, places = tweak.base, tweak.places
+    if not isinstance(base, dict) or not isinstance(places, dict):
+        return False
+    rows = [*places.values()]
+    if not isinstance(tweak.layer, str) or any(type(r) is not list or len(r) != 3 for r in rows):
+        return False
+    numbers = [tweak.first, tweak.last, tweak.fade, *base.values(), *(n for r in rows for n in r)]
+    return all(isinstance(n, (int, float)) and math.isfinite(n) for n in numbers)
 
 
 def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> None:
