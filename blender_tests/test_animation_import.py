@@ -50,6 +50,39 @@ def _curves(action):
     return list(scene.submodule("scene.base.compat").curves_of(action))
 
 
+def _table(tmp_path):
+    path = tmp_path / "take.csv"
+    path.write_text(f"time,{JAW}\n0,0\n1,1\n")
+    return str(path)
+
+
+def test_what_an_import_leaves_as_it_was_is_named_and_can_be_brought_to_rest(rig, tmp_path, capfd):
+    """A layer says nothing: it lies above the pose."""
+
+    def bring(**options):
+        scene.set_controls(rig, browDownL=0.38, mouthCornerPullL=0.2, jawOpen=0.6)
+        capfd.readouterr()
+        assert bpy.ops.risorius.import_animation(filepath=_table(tmp_path), **options) == {
+            "FINISHED"
+        }
+        return capfd.readouterr().out
+
+    said = "It leaves these controls as they were: mouthCornerPullL 0.20, browDownL 0.38."
+    assert "leaves these" not in bring(target="LAYER")
+    assert said in bring()
+    report = Recorder()
+    panel = scene.submodule("ui.animation.panel").RISORIUS_PT_animation
+    panel.draw(type("Panel", (), {"layout": report})(), bpy.context)
+    assert said in report.text()
+    assert "risorius.rest_others" in report.operators
+    assert bpy.ops.risorius.rest_others() == {"FINISHED"}
+    assert [scene.face(rig)[n] for n in (BROW, PULL)] == [0.0, 0.0]
+    assert bpy.ops.risorius.rest_others() == {"CANCELLED"}
+    scene.controls(rig).animation_data.action = None
+    assert "2 controls were brought to rest." in bring(target="STRIP", use_rest=True)
+    assert [scene.face(rig)[n] for n in (BROW, PULL)] == [0.0, 0.0]
+
+
 @pytest.mark.parametrize(("fps", "base"), [(24, 1.0), (30, 1.001), (60, 1.0), (25, 1.0)])
 def test_keys_lie_at_their_seconds(rig, fps, base):
     clip = _clip()

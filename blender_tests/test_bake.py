@@ -694,10 +694,12 @@ def test_the_panel_shows_the_state_and_the_way_back(dna_file):
     panel = scene.submodule("ui.face.panel").RISORIUS_PT_character
     assert "risorius.unbake" not in drawn(panel).operators
     _bake(start=2, end=9)
-    assert "it plays its actions, frames 2 to 9." in drawn(panel).text()
     assert "risorius.unbake" in drawn(panel).operators
-    out = drawn(scene.submodule("ui.bake.panel").RISORIUS_PT_out)
+    below = scene.submodule("ui.bake.panel").RISORIUS_PT_out
+    out = drawn(below)
+    assert "it plays its actions, frames 2 to 9." in out.text()
     assert out.operators == [
+        "risorius.unbake",
         "risorius.bake",
         "risorius.export_animation",
         "risorius.bake_physics",
@@ -707,7 +709,7 @@ def test_the_panel_shows_the_state_and_the_way_back(dna_file):
     _bake(kind="CONTROLS")
     assert (
         "The controls are baked; layers, NLA and drivers rest, frames 1 to 10."
-        in drawn(panel).text()
+        in drawn(below).text()
     )
 
 

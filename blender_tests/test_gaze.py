@@ -315,6 +315,39 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
     assert scene.face(blinking)["CTRL_expressions.eyeBlinkL"] == 0.0
 
 
+def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
+    """The active object, else a selected one, an Empty before others, else the camera."""
+    operators = scene.submodule("ui.hand.gaze")
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    empty = bpy.data.objects.new("empty", None)
+    thing = bpy.data.objects.new("thing", camera.data)
+    for item in (camera, thing, empty):
+        bpy.context.scene.collection.objects.link(item)
+    bpy.context.scene.camera = camera
+    assert operators.proposed(bpy.context) == "camera"
+    for item in (thing, empty):
+        item.select_set(True)
+        assert operators.proposed(bpy.context) == item.name  # beside the face, which is active
+    empty.select_set(False)
+    bpy.context.view_layer.objects.active = empty
+    assert operators.proposed(bpy.context) == "empty"
+
+
+def test_a_blink_during_a_tweak_touches_no_key(blinking):
+    bpy.ops.risorius.blink()
+    before = {
+        c.data_path: [*k.co]
+        for c in scene.curves(scene.controls(blinking))
+        for k in c.keyframe_points
+    }
+    bpy.ops.risorius.tweak(first=10, last=30)
+    bpy.context.scene.frame_set(20)
+    assert bpy.ops.risorius.blink() == {"FINISHED"}
+    now = scene.curves(scene.controls(blinking))
+    assert {c.data_path: [*k.co] for c in now for k in c.keyframe_points} == before
+    assert [y.name for y in scene.controls(blinking).risorius_layers] == ["Blinks"]
+
+
 def test_a_blink_begins_and_ends_at_what_the_lids_show(blinking):
     bone, path = scene.face(blinking), 'pose.bones["face"]["CTRL_expressions.eyeBlinkL"]'
     for frame, value in ((10, 0.1), (22, 0.7), (30, 0.3)):

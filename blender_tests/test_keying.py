@@ -120,6 +120,10 @@ HANDS = {
         lambda rig: _asset(rig, bpy.ops.risorius.blend_pose_asset),
         {JAW: None, LEFT: None, RIGHT: None},
     ),
+    "risorius.rest_others": (
+        lambda rig: bpy.ops.risorius.rest_others(),
+        {LEFT: 0.0, RIGHT: 0.0, JAW: 0.0},
+    ),
     "risorius.breakdown": (
         lambda rig: bpy.ops.risorius.breakdown(kind="REST", factor=0.5),
         {LEFT: 0.4, RIGHT: 0.05, JAW: 0.25},

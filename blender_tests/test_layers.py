@@ -808,6 +808,15 @@ def test_a_layer_of_what_is_not_there_is_refused(rig, kind, words):
         bpy.ops.risorius.layer_warp()
 
 
+def test_an_expression_starts_at_the_current_frame_and_so_does_its_strip(rig):
+    bpy.context.scene.frame_set(20)
+    assert bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy") == {"FINISHED"}
+    assert _layers().of(scene.controls(rig))[0].start == 20.0
+    assert [_value(rig, frame, PULL) > 0.5 for frame in (19, 20, 50)] == [False, True, True]
+    assert bpy.ops.risorius.layers_to_nla() == {"FINISHED"}
+    assert [_value(rig, frame, PULL) > 0.5 for frame in (19, 20, 50)] == [False, True, True]
+
+
 def test_a_reaction_that_is_gone_is_named_and_the_others_are_shown(blinker):
     bpy.context.scene.frame_set(15)
     assert bpy.ops.risorius.fire(reaction="flash") == {"FINISHED"}

@@ -35,7 +35,7 @@ def test_of_two_faces_the_panel_says_that_none_is_selected(rig, dna_file):
     assert "No face is selected: click on one." in layout.text()
 
 
-def test_a_fresh_face_has_a_hint_until_it_moves_or_it_is_dismissed(rig):
+def test_a_face_has_a_hint_until_it_is_dismissed(rig):
     def says():
         return "pull at the skin" in drawn(bpy.types.RISORIUS_PT_character).text()
 
@@ -44,9 +44,7 @@ def test_a_fresh_face_has_a_hint_until_it_moves_or_it_is_dismissed(rig):
     entry.module = scene.MODULE
     assert says()
     scene.set_controls(rig, jawOpen=0.3)
-    assert not says()
-    scene.set_controls(rig, jawOpen=0.0)
-    assert says()
+    assert says()  # a hand on a slider must not find another one under it
     assert bpy.ops.risorius.hide_hints() == {"FINISHED"}
     assert not says()
     addons[scene.MODULE].preferences.hints = True

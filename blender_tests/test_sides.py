@@ -62,6 +62,25 @@ def test_a_region_is_copied_and_pasted_flipped(rig):
     assert value(rig, "mouthCornerPullL") == pytest.approx(0.7)
 
 
+def test_copied_and_saved_is_the_pose_that_is_seen_with_its_layers(rig):
+    scene.set_controls(rig, browDownL=0.4)
+    bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy")
+    bpy.context.view_layer.update()
+    assert value(rig, "mouthCornerPullL") == 0.0
+    assert bpy.ops.risorius.copy_pose() == {"FINISHED"}
+    assert bpy.ops.risorius.save_expression(label="Seen", group="own") == {"FINISHED"}
+    bpy.ops.risorius.layer_remove()
+    bpy.ops.risorius.reset()
+    for bring in (
+        bpy.ops.risorius.paste_pose,
+        lambda: bpy.ops.risorius.expression(expression="seen"),
+    ):
+        assert bring() == {"FINISHED"}
+        assert value(rig, "mouthCornerPullL") > 0.5
+        assert value(rig, "browDownL") == pytest.approx(0.4)
+        bpy.ops.risorius.reset()
+
+
 def test_linked_sides_move_together_and_are_free_again(rig):
     scene.set_controls(rig, mouthCornerPullR=0.9)
     assert bpy.ops.risorius.link_sides(from_left=True) == {"FINISHED"}

@@ -68,17 +68,26 @@ def test_it_stands_where_the_face_does(rig):
     assert watts[1] == pytest.approx([4 * w for w in watts[0]], rel=1e-4)
 
 
-def test_the_scene_s_camera_stays_unless_asked(rig):
+def _own_camera():
     own = bpy.data.objects.new("own", bpy.data.cameras.new("own"))
     bpy.context.scene.collection.objects.link(own)
     bpy.context.scene.camera = own
-    _add()
-    assert bpy.context.scene.camera == own
-    asked = _camera(_add(use_scene_camera=True))
-    assert bpy.context.scene.camera == asked
+    return own
+
+
+def test_a_render_shows_the_portrait_and_the_camera_of_before_is_kept(rig, capfd):
+    own = _own_camera()
+    made = _camera(_add())
+    assert bpy.context.scene.camera == made
+    assert "own was the scene's camera and is kept" in capfd.readouterr().out
+    assert own.name in bpy.context.scene.objects
+    assert _camera(_add(use_scene_camera=False)) != bpy.context.scene.camera == made
     bpy.context.scene.camera = None
-    taken = _camera(_add())
+    taken = _camera(_add(use_scene_camera=False))
     assert bpy.context.scene.camera == taken
+    bpy.context.scene.timeline_markers.new("cut", frame=5).camera = own
+    _add()
+    assert "The marker cut gives the scene another camera" in capfd.readouterr().out
 
 
 def test_nothing_else_of_the_scene_changes(rig):
@@ -99,23 +108,26 @@ def _state(rig):
 
 
 def test_one_undo_takes_it_away(rig):
+    own = _own_camera().name
     before = scene.counts()
     bpy.ops.ed.undo_push(message="before")
     _add()
     bpy.ops.ed.undo_push(message="studio")
     bpy.ops.ed.undo()
     assert scene.counts() == before
-    assert bpy.context.scene.camera is None
+    assert bpy.context.scene.camera.name == own
 
 
 def test_with_a_new_face_only_where_it_is_wanted(monkeypatch, dna_file):
     native = scene.submodule("native")
     monkeypatch.setattr(native, "bundled_sample", lambda person: dna_file)
+    _own_camera()
     assert bpy.ops.risorius.add_character() == {"FINISHED"}
-    assert not [o for o in bpy.data.objects if o.type in {"CAMERA", "LIGHT"}]
+    assert [o.name for o in bpy.data.objects if o.type in {"CAMERA", "LIGHT"}] == ["own"]
     assert bpy.ops.risorius.add_character(use_studio=True) == {"FINISHED"}
     made = [c for c in bpy.data.collections if c.name.endswith("_studio")]
     assert [sorted(o.type for o in c.objects) for c in made] == [OURS]
+    assert bpy.context.scene.camera == _camera(made[0])
     assert len([o for o in bpy.data.objects if "risorius_controls" in o]) == 2
 
 

@@ -77,7 +77,7 @@ def test_solo_shows_one_control_and_leaves_the_values(rig, dna_file, mode):
     scene.set_controls(rig, jawOpen=0.4)  # it follows
     alone = raw_with(rig, dna_file, mouthCornerPullL=0.0)
     assert scene.error_against_oracle(rig, dna_file, alone) < scene.TOLERANCE
-    text = drawn(bpy.types.RISORIUS_PT_why).text()
+    text = drawn(bpy.types.RISORIUS_PT_character).text()
     assert "Solo: Jaw Open" in text
     bpy.ops.risorius.solo(control=PULL, extend=True)
     both = scene.raw_of(rig, dna_file)
@@ -85,7 +85,7 @@ def test_solo_shows_one_control_and_leaves_the_values(rig, dna_file, mode):
     bpy.ops.risorius.solo(control=JAW)
     assert bpy.ops.risorius.show_all() == {"FINISHED"}
     assert scene.error_against_oracle(rig, dna_file, both) < scene.TOLERANCE
-    assert "Solo" not in drawn(bpy.types.RISORIUS_PT_why).text()
+    assert "Solo" not in drawn(bpy.types.RISORIUS_PT_character).text()
 
 
 def test_solo_of_a_corrective_shows_its_factors(rig, dna_file):
@@ -114,7 +114,7 @@ def test_muted_parts_rest(rig, dna_file, kind):
             shown = scene.evaluated(item)
             assert np.abs(shown - oracle.vertices(dna, index, pose)).max() < 2e-5
     assert list(rig["maps"]) == pytest.approx(pose.animated_maps.tolist())
-    assert "Muted" in drawn(bpy.types.RISORIUS_PT_why).text()
+    assert "Muted" in drawn(bpy.types.RISORIUS_PT_character).text()
     bpy.ops.risorius.mute(kind=kind, enable=False)
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE

@@ -30,9 +30,11 @@ from common import (
     look_at_face,
     open_section,
     ready_tab,
+    scroll,
     slider,
 )
 from hand import HEIGHT, WIDTH, Hand, LateError, difference
+from keyed import keyed
 from shot import shot
 from skin import drag_in_views, drag_skin
 
@@ -213,7 +215,8 @@ def see_why(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.click(*hand.find(r"risorius\.mute\(.*JOINTS", columns=(0.45, 0.55, 0.35)))
     hand.wait("muted", lambda: hand.ask("state")["look"])
     yield "joints that are muted rest in the view", difference(before, hand.still(), box) > 0.02
-    hand.click(*hand.find(r"risorius\.show_all"))
+    scroll(hand, -40)
+    hand.click(*hand.find(r"risorius\.show_all", columns=(0.85, 0.9, 0.8)))
     hand.wait("whole", lambda: not hand.ask("state")["look"])
     yield "and one click shows the whole face", difference(before, hand.still(), box) < 0.02
     clear(hand)
@@ -231,6 +234,7 @@ view()[0].tag_redraw()
 STEPS: tuple[Step, ...] = (
     start,
     drag_slider,
+    keyed,
     drag_skin,
     drag_in_views,
     grid,

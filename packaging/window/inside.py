@@ -282,6 +282,20 @@ def keyed_frames():
     return sorted({round(p.co.x) for c in curves for p in c.keyframe_points})
 
 
+def seen_keys():
+    """Frames of the keys of the face that the timeline's editor lets one see."""
+    area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
+    region = next(r for r in area.regions if r.type == "WINDOW")
+    with over(area, region):
+        curves = list(bpy.context.visible_fcurves or ())
+    return sorted({round(p.co.x) for c in curves for p in c.keyframe_points})
+
+
+def tweaks():
+    """Whether a tweak is on."""
+    return module("scene.animation.tweaks").of(rig()["risorius_controls"]) is not None
+
+
 def given_by_board(control):
     """What the board gives of a raw control."""
     return float(module("scene.character.board").given(rig()).get(control, 0.0))

@@ -17,7 +17,7 @@ from ...logic.base.sentences import Sentence, told
 from ...logic.character import board_fit
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
-from ..character import armatures, board, board_bones, runtime
+from ..character import armatures, board, board_bones, runtime, shown_keys
 from . import actions, clip_actions
 
 TOLERANCE = 5e-4  # how far a straight line between two keys may be from what was converted
@@ -84,6 +84,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
         done.kept = action
         loss, done.curves = convert(rig, copy, by_board)
         losses.append(loss)
+        shown_keys.show(controls, [c.data_path for c in compat.curves_for(copy, controls)])
     board.set_lead(controls, by_board)
     board_bones.show(controls, by_board)
     done.loss = max(losses, key=lambda loss: loss.largest)

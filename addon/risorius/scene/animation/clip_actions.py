@@ -19,7 +19,7 @@ from ...logic.animation import clip_units
 from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
-from ..character import armatures, runtime
+from ..character import armatures, runtime, shown_keys
 from . import curve_colours
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
@@ -251,6 +251,7 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
     if before is not None and before != action:
         before.use_fake_user = True
     compat.assign_action(data, action, compat.slot_for(action, controls))
+    shown_keys.show(controls, [c.data_path for c in compat.curves_for(action, controls)])
     return before if before != action else None
 
 

@@ -18,7 +18,7 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context
-from ..character import armatures, board, runtime
+from ..character import armatures, board, runtime, shown_keys
 from . import clip_actions, curve_colours, tweaks
 
 if TYPE_CHECKING:
@@ -167,6 +167,7 @@ def by_hand(
         FaceError: no key is selected; a tweak is on that does not reach here. All stands as before.
     """
     controls = parts.controls_there(rig)
+    shown_keys.show_some(controls)
     if at_selected:
         return _at_selected(context, controls, move, at)
     if at is not None:
@@ -351,7 +352,7 @@ def insert(
         How many properties were keyed.
     """
     keyed, driven = curves_by_path(controls), _driven(controls)
-    count = 0
+    done = []
     for path, group, axes in _wanted(controls, labels, bones):
         curves = keyed.get(path, [])
         if path in driven or not _may(controls, path, curves, frame, rules):
@@ -360,7 +361,7 @@ def insert(
             controls.keyframe_insert(
                 path, index=index, frame=frame, group=group, keytype=rules.kind
             )
-        count += 1
+        done.append(path)
         data = controls.animation_data
         assert data is not None
         assert data.action is not None
@@ -369,7 +370,9 @@ def insert(
             curves = _new_curves(bag, path)
         for curve in curves:
             _finish(curve, rules)
-    return count
+    if done:
+        shown_keys.show(controls, done)
+    return len(done)
 
 
 def _wanted(

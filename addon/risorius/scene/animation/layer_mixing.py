@@ -309,9 +309,9 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
-    """A pose stands always, or for its length from its start on."""
+    """A pose stands always, from its start on, or for its length."""
     if not layer.length:
-        return {}
+        return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
 
 

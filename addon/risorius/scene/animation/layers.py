@@ -13,6 +13,7 @@ from ... import native
 from ...logic.animation import layer_rules as logic
 from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
+from ..character import shown_keys
 from .layer_properties import REACTIONS, RISORIUS_PG_layer, RISORIUS_PG_reaction
 
 _KEY_SETTINGS = (
@@ -146,6 +147,7 @@ def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> R
     for key, value in settings.items():
         setattr(layer, key, value)
     controls.risorius_layers_index = len(places(controls)) - 1
+    shown_keys.show_some(controls)
     controls.update_tag()
     return layer
 

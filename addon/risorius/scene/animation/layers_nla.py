@@ -126,7 +126,8 @@ def _add_strip(
     strip.use_auto_blend = False
     strip.blend_type = _BLENDS[layer.blend]  # pyright: ignore[reportAttributeAccessIssue]
     if still:
-        strip.extrapolation = "NOTHING" if layer.length else "HOLD"
+        endless = "HOLD" if layer.extend == "HOLD" else "HOLD_FORWARD"
+        strip.extrapolation = "NOTHING" if layer.length else endless
         strip.frame_start = layer.start
         strip.frame_end = layer.start + (layer.length or 1.0)
     else:

@@ -59,6 +59,26 @@ def driver_of(curve: bpy.types.FCurve) -> bpy.types.Driver:
     return curve.driver
 
 
+def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
+    """What says whether a bone is selected: since 5.0 the pose bone."""
+    return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone
+
+
+def is_bone_selected(bone: bpy.types.PoseBone) -> bool:
+    """Whether a bone of an armature is selected in pose mode."""
+    return bool(_selecting(bone).select)
+
+
+def select_bone(bone: bpy.types.PoseBone, chosen: bool = True) -> None:
+    """Select a bone of an armature in pose mode; others stay as they are.
+
+    Args:
+        bone: the pose bone.
+        chosen: select it, else take it out of the selection.
+    """
+    _selecting(bone).select = chosen
+
+
 def deselect_all(layer: bpy.types.ViewLayer) -> None:
     """Select no object of a view layer.
 

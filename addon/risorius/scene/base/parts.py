@@ -117,6 +117,16 @@ def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:
     return rig if rig is not None and is_rig(rig) else None
 
 
+def title_of(rig: ArmatureObject) -> str:
+    """The name of a character: two of them have two names.
+
+    Args:
+        rig: its deforming armature, whose copies are called Anna_rig.001.
+    """
+    name, mark, number = rig.name.rpartition("_rig")
+    return name + number if mark else rig.name
+
+
 def maximum_of(controls: ArmatureObject) -> float:
     """The hard maximum of a character's sliders. Args: controls  its control armature."""
     return 1.5 if controls.get(OVERDRIVE) else 1.0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...language import tables
 from ...logic.character import plans
-from ..base import parts
+from ..base import compat, parts
 from ..base.blender_types import ArmatureObject, Context
 from . import bone_shapes
 
@@ -32,8 +32,8 @@ def _edit_bones(
 ) -> Iterator[bpy.types.ArmatureEditBones]:
     """The edit bones of an armature object, which must not be linked anywhere yet.
 
-    Edit bones exist only in edit mode, and only an operator enters it: the one place in
-    scene/ that calls some.
+    Edit bones exist only in edit mode, and only an operator enters it. No other file in scene/
+    changes a mode.
     """
     layer = context.view_layer
     previous = layer.objects.active
@@ -91,6 +91,21 @@ def kept_selection(context: Context) -> Iterator[None]:
         if active is not None and active in there and active.mode != mode:
             with context.temp_override(active_object=active, object=active):
                 bpy.ops.object.mode_set(mode=mode)
+
+
+def join_pose_mode(context: Context, item: ArmatureObject) -> None:
+    """Let an armature be in pose mode beside the active object, which is in it already.
+
+    Args:
+        context: a Blender context, whose view layer has both.
+        item: the armature; where Blender refuses it stays as it is.
+    """
+    layer = context.view_layer
+    active, layer.objects.active = layer.objects.active, item
+    with context.temp_override(active_object=item, object=item):
+        if bpy.ops.object.mode_set.poll():  # pyright: ignore[reportCallIssue]  wrong in the stubs
+            bpy.ops.object.mode_set(mode="POSE")
+    layer.objects.active = active
 
 
 def build_rig(
@@ -260,6 +275,7 @@ def build_controls(
             bone.lock_rotation = (True, True, True)
         bone_shapes.place(bone, name, room)
     data.bones.active = data.bones[parts.FACE]
+    compat.select_bone(controls.pose.bones[parts.FACE])
     controls.show_in_front = True
     controls[parts.OVERDRIVE] = False
     controls.property_overridable_library_set(f'["{parts.OVERDRIVE}"]', True)

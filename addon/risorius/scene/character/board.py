@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import cast
 
 import bpy
 import numpy as np
@@ -18,7 +17,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...logic.character import board_fit, board_layout
-from ..base import parts
+from ..base import compat, parts
 from ..base.blender_types import ArmatureObject
 from . import runtime
 
@@ -409,11 +408,6 @@ def is_same(one: runtime.Runtime, other: runtime.Runtime) -> bool:
     return one.handles == other.handles
 
 
-def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
-    """What says whether a bone is selected: since 5.0 the pose bone."""
-    return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone
-
-
 def is_selected(controls: ArmatureObject, bone: str) -> bool:
     """Whether a handle is selected.
 
@@ -421,7 +415,7 @@ def is_selected(controls: ArmatureObject, bone: str) -> bool:
         controls: control armature.
         bone: name of its bone, which is there.
     """
-    return bool(_selecting(controls.pose.bones[bone]).select)
+    return compat.is_bone_selected(controls.pose.bones[bone])
 
 
 def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None:
@@ -435,7 +429,7 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
     chosen = set(bones)
     for bone in controls.pose.bones:
         if bone.name in chosen or not extend:
-            _selecting(bone).select = bone.name in chosen
+            compat.select_bone(bone, bone.name in chosen)
 
 
 def path_of(bone: str) -> str:

@@ -110,12 +110,14 @@ def captured(
     name: str,
     label: str,
     group: str,
+    values: Mapping[str, float],
     regions: Collection[str] = (),
 ) -> native.Expression:
     """What a face shows now as an expression.
 
     Args:
         rig: the character.
+        values: what it shows, by the names of its sliders.
         name: of the expression.
         label: what it is called.
         group: its category.
@@ -125,7 +127,6 @@ def captured(
         LibraryError: all sliders of these regions are at rest.
     """
     live = runtime.there(rig)
-    values = sides.values_of(rig)
     rests = dict(zip(live.labels, live.rests, strict=True))
     known = native.regions()
     moved = expression_mix.regions_in_use(values, rests, known)

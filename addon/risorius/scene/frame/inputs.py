@@ -11,9 +11,9 @@ from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...logic.base.space import yaw_pitch
-from ..animation import layer_mixing
+from ..animation import layer_mixing, layers
 from ..base import parts
-from ..base.blender_types import ArmatureObject, Depsgraph
+from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import board, rig_placement, runtime
 from . import gaze, joint_turns
 
@@ -65,6 +65,25 @@ def read_mixed(
     own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
     raw, own["head"] = layer_mixing.mix(seen, live, raw, own["head"], depsgraph, maximum)
     return raw, own
+
+
+def seen_sliders(context: Context, rig: ArmatureObject) -> dict[str, float]:
+    """What a face is seen with, by the names of its sliders: board and layers included.
+
+    Args:
+        context: has the evaluated scene.
+        rig: the character.
+    """
+    live, controls = runtime.there(rig), parts.controls_there(rig)
+    if not layers.has_any(controls):
+        return board.raw_now(rig)
+    controls.update_tag()  # a script may have set sliders that Blender has not heard of
+    depsgraph = context.evaluated_depsgraph_get()
+    seen = controls.evaluated_get(depsgraph)
+    raw, _turns = read_mixed(seen, live, depsgraph, parts.maximum_of(controls))
+    face = controls.pose.bones[parts.FACE]
+    pairs = zip(live.labels, raw.tolist(), strict=True)
+    return {label: value for label, value in pairs if label in face}
 
 
 def complete(

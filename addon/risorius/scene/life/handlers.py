@@ -11,10 +11,10 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ... import native
-from ..animation import layer_mixing, layers
+from ..animation import layer_mixing, layers, tweak_guard
 from ..base import console, parts, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
-from ..character import board, lods, outlines, rig_placement, runtime
+from ..character import board, lods, outlines, rig_placement, runtime, shown_keys
 from ..frame import (
     caches,
     channel_preview,
@@ -44,6 +44,9 @@ _state: dict[str, Any] = {
 def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
     timing.begin()
     caches.look()
+    if not _state["rendering"] and not native.problem():
+        for controls in filter(None, map(parts.controls_of, parts.rigs())):
+            tweak_guard.settle(controls)
     evaluate.before_frame(scene, _is_rendered())
 
 
@@ -127,6 +130,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     known = _state["objects"]
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
+    come = bool(known)  # else all was there: a file was loaded, or an edit undone
     if new or len(bpy.data.objects) != len(known):
         _state["objects"] = {item.session_uid for item in bpy.data.objects}
         runtime.forget_unused(parts.rigs())
@@ -134,6 +138,9 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
         layer_mixing.forget_unused(map(parts.controls_of, parts.rigs()))
         console.say(*migrations.bring_up_all())
         console.say(*duplicates.separate_all())
+        for controls in filter(None, map(parts.controls_of, parts.rigs() if come else ())):
+            if controls.session_uid not in known:
+                shown_keys.show_some(controls)
         sharing.keep()
         lateness.forget()
 
@@ -176,7 +183,24 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
+    _note_keys(depsgraph.scene.frame_current_final, armatures, actions)
     return [rig for rig in parts.rigs() if _concerned(rig, armatures, actions, camera_moved)]
+
+
+def _note_keys(
+    frame: float, armatures: Collection[bpy.types.Object], actions: Collection[bpy.types.Action]
+) -> None:
+    """Look for keys that Blender's own operators gave to sliders, and for sliders that moved."""
+    for rig in parts.rigs():
+        controls = parts.controls_of(rig)
+        data = controls.animation_data if controls is not None else None
+        action = data.action if data is not None else None
+        if controls is not None and (
+            action in actions or (action is None and controls in armatures)
+        ):
+            shown_keys.note_edit(controls)
+        if controls is not None and (action in actions or controls in armatures):
+            tweak_guard.note_edit(controls, frame, action in actions)
 
 
 def _concerned(
@@ -209,6 +233,8 @@ def _loaded(*_arguments: object) -> None:
         if context.scene is not None:
             controls_ahead.note_evaluated(context.scene)
         repair.heal_all()
+        for controls in filter(None, map(parts.controls_of, parts.rigs())):
+            shown_keys.show_some(controls)
         written.forget()
         look_masks.take_away()  # of a file that Blender saved by itself, before a crash
         heat.end_all()
@@ -226,6 +252,8 @@ def _restored(*_arguments: object) -> None:
     written.forget()
     lateness.forget()
     layer_mixing.forget()
+    shown_keys.forget()
+    tweak_guard.forget()
     applied_transforms.forget()
     bone_edits.forget()
     causes.forget()

@@ -17,6 +17,7 @@ from ...logic.base import names
 from ..animation import actions, board_keys, clip_actions, layers
 from ..base import parts
 from ..base.blender_types import ArmatureObject
+from ..character import standing
 
 _waiting: list[Recording] = []  # ended without becoming an action, the oldest first
 
@@ -83,6 +84,8 @@ def finish(
         report.notes.append(f"The take is full: {take.full} faces were left out.")
     report.notes += board_keys.onto_leader(rig, report.action)
     layers.keep_weights(controls, clip_actions.play(rig, report.action))
+    left = standing.beside(rig).sentence
+    report.notes += [left] if left is not None else []
     scene.frame_end = max(scene.frame_end, round(report.last))
     _waiting.remove(recording)
     return report

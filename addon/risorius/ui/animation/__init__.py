@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Animation that comes in from files and from other rigs."""
 
-from . import mesh_operators, operators, panel
+from . import mesh_operators, operators, panel, rest_operators
 
-CLASSES = (*operators.CLASSES, *mesh_operators.CLASSES, *panel.CLASSES)
+CLASSES = (*operators.CLASSES, *mesh_operators.CLASSES, *rest_operators.CLASSES, *panel.CLASSES)

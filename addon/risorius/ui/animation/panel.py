@@ -38,6 +38,7 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         header, body = layout.panel("RISORIUS_PT_import_report", default_closed=True)
         words.show(header, words.say("Import of {action}", action=action.name))
         if body is not None:
+            body.operator("risorius.rest_others", icon="LOOP_BACK")
             for line in lines:
                 words.write(body, line)
 

@@ -12,6 +12,8 @@ from ...logic.animation.clip_units import ClipError
 from ...logic.base.names import printable
 from ...scene.animation import actions, board_keys, clip_actions, layers
 from ...scene.base import saved
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import standing
 from ...scene.frame import evaluate
 from ..blender_types import Context, UILayout
 from ..common import FaceOperator, face_controls, face_rig
@@ -44,6 +46,13 @@ class PlacesClip(FaceOperator):
     )
     scene_range: bpy.props.EnumProperty(
         name="Scene Range", description="First and last frame of the scene", items=RANGES
+    )
+
+    use_rest: bpy.props.BoolProperty(
+        name="Bring to Rest",
+        description="Controls that the animation does not move go to rest; else they stay as "
+        "they are, and the report names them",
+        options={"SKIP_SAVE"},
     )
 
     def start_with(self, scene: bpy.types.Scene) -> None:
@@ -96,10 +105,24 @@ class PlacesClip(FaceOperator):
             clip_actions.add_strip(rig, made.action)
         else:
             layers.add_action(face_controls(context), made.action, **self.layer_settings(context))
+        if self.target != "LAYER":  # a layer lies above the pose, and leaves what it does not move
+            notes += self._others(rig)
         clip_actions.set_range(context.scene, made, self.scene_range)
         evaluate.bring_up(context, rig)
         self._report_on(made, notes)
         return made.action
+
+    def _others(self, rig: ArmatureObject) -> list[str]:
+        """Bring what the animation does not move to rest, or say that it stays as it was."""
+        found = standing.beside(rig)
+        sentence = found.sentence
+        if sentence is None:
+            return []
+        if not self.use_rest:
+            return [say(sentence)]
+        standing.bring_to_rest(rig, found)
+        count = len(found.sliders) + len(found.handles)
+        return [say("{count} controls were brought to rest.", count=count)]
 
     def layer_settings(self, context: Context) -> dict[str, object]:
         """Properties of the layer that a clip becomes. Args: context  has the frame rate."""
@@ -120,7 +143,7 @@ class PlacesClip(FaceOperator):
 
     def draw_place(self, layout: UILayout) -> None:
         """The properties of this class."""
-        for name in ("target", "start", "scene_range"):
+        for name in ("target", "start", "scene_range", "use_rest"):
             layout.prop(self, name)
 
 

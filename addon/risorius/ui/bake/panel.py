@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Bake and Export, and what the panel Face says of a baked face."""
+"""The panel Bake and Export, and what the panel Face says of a face that is late."""
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import caches, hindrances, lateness
 from .. import words
 from ..blender_types import Context, Panel, UILayout
-from ..common import FaceOnlyPanel
+from ..common import FaceOnlyPanel, face_rig
 from .operators import RISORIUS_OT_unbake
 
 
@@ -18,6 +18,10 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
 
     def draw(self, context: Context) -> None:
         column = self.layout.column(align=True)
+        text = bake_face.words(face_rig(context))
+        if text:
+            words.write(column, text, "ACTION")
+            column.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
         # A dialog for each; the defaults are those of the last time.
         column.operator_context = "INVOKE_DEFAULT"
         column.operator("risorius.bake", icon="ACTION")
@@ -26,18 +30,13 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
         column.operator("risorius.export_web", icon="URL")
 
 
-def draw_state(layout: UILayout, rig: ArmatureObject) -> None:
-    """What the panel says of a baked face, with the way back, and of one that is late.
+def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
+    """What the panel says of a face that is late.
 
     Args:
         layout: of the panel.
         rig: deforming armature.
     """
-    text = bake_face.words(rig)
-    if text:
-        box = layout.box()
-        words.write(box, text, "ACTION")
-        box.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
     caches.look()
     said = (lateness.words(rig), caches.words(rig), *hindrances.words(rig))
     for late in filter(None, said):

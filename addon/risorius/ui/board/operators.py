@@ -9,9 +9,9 @@ import bpy
 
 from ... import native
 from ...logic.base import names
-from ...scene.animation import board_keys
+from ...scene.animation import board_keys, tweaks
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import board, board_bones, runtime
+from ...scene.character import board, board_bones, runtime, shown_keys
 from ...scene.frame import evaluate
 from ...scene.live import sessions
 from ..blender_types import Context, Operator, Result
@@ -30,7 +30,20 @@ def _regions(_self: object, _context: object) -> list[tuple[str, str, str]]:
     return [("ALL", "All", ""), *((region.upper(), title, "") for region, title in titles.items())]
 
 
-class _OwnArmature(FaceOperator):
+class _Leading(FaceOperator):
+    """What operators share that may change what leads the face: no tweak is on meanwhile."""
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if tweaks.of(face_controls(context)) is not None:
+            cls.poll_message_set(say("A tweak is on: choose Done at the top of the tab first."))
+            return False
+        return True
+
+
+class _OwnArmature(_Leading):
     """What operators share that make or remove bones of the controls."""
 
     @classmethod
@@ -112,6 +125,7 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
         if board.leads_face(rig):
             board_keys.switch(rig, by_board=False, with_keys=True)
         board_bones.remove(context, rig)
+        shown_keys.show_some(face_controls(context))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
@@ -121,7 +135,7 @@ def _has_board(context: Context) -> bool:
     return controls is not None and board.is_there(controls, runtime.of(face_rig(context)))
 
 
-class RISORIUS_OT_lead(FaceOperator, Operator):
+class RISORIUS_OT_lead(_Leading, Operator):
     """Choose what moves the face: its sliders or its board. The pose goes over to it"""
 
     bl_idname = "risorius.lead"

@@ -16,6 +16,7 @@ from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.base.task import Task
 from ...scene.character import runtime
 from ...scene.expressions import assets, library, poses, thumbnails
+from ...scene.frame import inputs
 from ..beside import RunsBeside
 from ..blender_types import Context, Operator, OperatorBase, Result
 from ..common import FaceOperator, face_rig, system_path
@@ -190,7 +191,9 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
             raise library.LibraryError(
                 told("There is an expression {label} already.", label=items[name].expression.label)
             )
-        expression = poses.captured(rig, name, label, group, self.regions)
+        expression = poses.captured(
+            rig, name, label, group, inputs.seen_sliders(context, rig), self.regions
+        )
         shared = chosen.to_library if self.shared == "PANEL" else self.shared == "YES"
         _put(context, rig, expression, shared)
         for note in assets.write_catalogs([group]) if bpy.data.filepath else ():
@@ -220,7 +223,9 @@ class RISORIUS_OT_update_expression(_OfOne, Operator):
         rig, item = face_rig(context), self.item(context)
         library.check_own(item)
         old = item.expression
-        expression = poses.captured(rig, old.name, old.label, old.group)
+        expression = poses.captured(
+            rig, old.name, old.label, old.group, inputs.seen_sliders(context, rig)
+        )
         new = replace(expression, description=old.description)
         _put(context, rig, new, item.path is not None, item.path)
 

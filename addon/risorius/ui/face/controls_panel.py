@@ -50,8 +50,6 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
         search, only_used = manager.risorius_search, manager.risorius_only_used
         followers = sides.followers(controls)
         led = draw_lead(layout, controls, live)
-        if led:
-            words.write(layout, "The board leads: the sliders show what it gives.", "INFO")
         given = board.given(rig) if led else {}
         _draw_tools(layout, context, bool(followers))
         shown = [name for name in live.labels if name in face and _is_found(name, search)]

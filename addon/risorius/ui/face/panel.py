@@ -8,17 +8,26 @@ from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import lods, rig_placement, runtime
 from ...scene.hair import strands
 from .. import words
-from ..bake.panel import draw_state
-from ..blender_types import Context, Icon, Panel, UILayout
-from ..common import FaceOnlyPanel, FacePanel, face_controls, face_rig
+from ..bake.panel import draw_late
+from ..blender_types import Context, Panel, UILayout
+from ..common import FaceOnlyPanel, FacePanel, active_controls, face_controls, face_rig
 from ..drag import panel as drag_panel
 from ..life.panel import draw_trouble
+from . import banner
 
 
 class RISORIUS_PT_character(FacePanel, Panel):
     bl_idname = "RISORIUS_PT_character"
     bl_label = "Face"
     bl_order = 0
+
+    def draw_header_preset(self, context: Context) -> None:
+        """Whose face it is, where the banner says something else or there are several."""
+        rig, controls = parts.active_rig(context), active_controls(context)
+        if rig is None or controls is None:
+            return
+        if len(parts.rigs()) > 1 or banner.modes(context, rig, controls):
+            words.show(self.layout, parts.title_of(rig))
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -36,20 +45,13 @@ class RISORIUS_PT_character(FacePanel, Panel):
         controls = parts.controls_of(rig)
         if live is None or controls is None:
             return  # said above
-        row = layout.row()
-        words.show(row, rig.name.removesuffix("_rig"), "USER")
-        row = row.row(align=True)
-        ruler = words.Ruler(context, 0.3)
-        buttons: tuple[tuple[str, Icon, str], ...] = (
-            ("risorius.reset", "LOOP_BACK", words.say("Reset")),
-            ("risorius.key", "KEYFRAME_HLT", words.say("Key All")),
-        )
-        for operator, icon, text in buttons:
-            shown = text if ruler.fits(text) else ""  # its tooltip says the same
-            row.operator(operator, text=shown, icon=icon, translate=False).region = ""
-        _draw_hint(layout, context, rig)
+        banner.draw(layout, context, rig, controls)
+        row = layout.row(align=True)
+        row.operator("risorius.reset", text="Reset", icon="LOOP_BACK").region = ""
+        row.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
         drag_panel.draw_button(layout, context)
-        draw_state(layout, rig)
+        _draw_hint(layout, context)
+        draw_late(layout, rig)
         for warning in plans.layer_warnings(live.rig.ignored_layers):
             words.write(layout, warning, "INFO")
 
@@ -74,11 +76,10 @@ def _draw_step(layout: UILayout, text: str) -> None:
     words.show(layout, text)
 
 
-def _draw_hint(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
-    """What to do with a face that nobody has moved yet, until it is read or done."""
+def _draw_hint(layout: UILayout, context: Context) -> None:
+    """What to do with a face, until a click says that it was read: sliders leave it alone."""
     addon = context.preferences.addons.get(native.ADDON)
-    hidden = addon is not None and not getattr(addon.preferences, "hints", True)
-    if hidden or not _is_at_rest(rig):
+    if addon is not None and not getattr(addon.preferences, "hints", True):
         return
     box = layout.box()
     row = box.row()
@@ -86,18 +87,6 @@ def _draw_hint(layout: UILayout, context: Context, rig: ArmatureObject) -> None:
     row.operator("risorius.hide_hints", text="", icon="X")
     words.write(box, "Take Drag the Face and pull at the skin, or open a region below.")
     words.write(box, "Key All holds the pose at this frame; Layers and Animation play over it.")
-
-
-def _is_at_rest(rig: ArmatureObject) -> bool:
-    """Whether no slider was moved and nothing plays."""
-    live, controls = runtime.of(rig), parts.controls_of(rig)
-    if live is None or controls is None:
-        return False
-    played = controls.animation_data
-    if played is not None and (played.action is not None or len(played.nla_tracks)):
-        return False
-    face = controls.pose.bones[parts.FACE]
-    return all(face.get(n, r) == r for n, r in zip(live.labels, live.rests, strict=True))
 
 
 def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:

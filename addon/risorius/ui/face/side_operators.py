@@ -10,7 +10,7 @@ import bpy
 from ... import native
 from ...logic.character import slider_rows
 from ...scene.character import sides
-from ...scene.frame import evaluate
+from ...scene.frame import evaluate, inputs
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
 from ..hand.base import HandOperator
@@ -98,7 +98,7 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
 
 
 class RISORIUS_OT_copy_pose(FaceOperator, Operator):
-    """Copy the sliders, to be pasted onto this face or another"""
+    """Copy the pose that is seen, with its layers, to be pasted onto this face or another"""
 
     bl_idname = "risorius.copy_pose"
     bl_label = "Copy Face"
@@ -109,7 +109,11 @@ class RISORIUS_OT_copy_pose(FaceOperator, Operator):
 
     def execute(self, context: Context) -> Result:
         _copied.clear()
-        _copied.update(sides.values_of(face_rig(context), self.region))
+        values = inputs.seen_sliders(context, face_rig(context))
+        of_slider = native.regions().of_slider
+        _copied.update(
+            (n, v) for n, v in values.items() if not self.region or of_slider(n) == self.region
+        )
         self.report({"INFO"}, say("{count} controls copied", count=len(_copied)))
         return {"FINISHED"}
 

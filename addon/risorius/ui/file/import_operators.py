@@ -13,13 +13,12 @@ from ...scene.base import parts, saved
 from ...scene.character import build, rig_placement
 from ...scene.file import sample_face
 from ...scene.frame import evaluate
-from ...scene.studio import build_studio
 from .. import words
 from ..beside import RunsBeside
 from ..blender_types import Context, FileHandler, ImportHelper, Menu, Operator, Result
 from ..common import MODES, explain, shown_progress, system_path, usable
 from . import framing
-from .studio_operators import SCENE_CAMERA
+from .studio_operators import SCENE_CAMERA, add_studio
 
 FRAME_VIEW = bpy.props.BoolProperty(
     name="Frame the View",
@@ -261,9 +260,8 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
     def _import(self, context: Context) -> Result:
         options = build.BuildOptions(mode=self.shape_mode)
         done = import_character(self, context, self._path, options, self.use_frame_view)
-        rig = parts.active_rig(context)
-        if done == {"FINISHED"} and self.use_studio and rig is not None:
-            build_studio.add(context, rig, self.use_scene_camera)
+        if done == {"FINISHED"} and self.use_studio and parts.active_rig(context) is not None:
+            add_studio(self, context, self.use_scene_camera)
         return done
 
     def finish(self, context: Context) -> Result:

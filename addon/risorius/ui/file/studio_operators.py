@@ -12,9 +12,33 @@ from ..words import say
 
 SCENE_CAMERA = bpy.props.BoolProperty(
     name="Scene Camera",
-    description="Make the studio's camera the scene's; a scene without a camera takes it anyway",
-    default=False,
+    description="Renders show the portrait: the studio's camera becomes the scene's, and the "
+    "camera of before is kept. A scene without a camera takes it anyway",
+    default=True,
+    options={"SKIP_SAVE"},
 )
+
+
+def add_studio(by: Operator, context: Context, scene_camera: bool) -> None:
+    """Build a studio around the active face, and report on it and on the scene's cameras.
+
+    Args:
+        by: the operator that reports.
+        context: has the scene and the face.
+        scene_camera: make its camera the scene's.
+    """
+    scene = context.scene
+    before = scene.camera
+    made = build_studio.add(context, face_rig(context), scene_camera)
+    by.report({"INFO"}, say("The studio is in the collection {name}", name=made.name))
+    if before is not None and scene.camera != before:
+        text = "{name} was the scene's camera and is kept"
+        by.report({"INFO"}, say(text, name=before.name))
+    for marker in scene.timeline_markers:
+        if scene_camera and marker.camera is not None:
+            text = "The marker {name} gives the scene another camera from its frame on."
+            by.report({"WARNING"}, say(text, name=marker.name))
+            break
 
 
 class RISORIUS_OT_add_studio(FaceOperator, Operator):
@@ -27,8 +51,7 @@ class RISORIUS_OT_add_studio(FaceOperator, Operator):
     use_scene_camera: SCENE_CAMERA
 
     def execute(self, context: Context) -> Result:
-        made = build_studio.add(context, face_rig(context), self.use_scene_camera)
-        self.report({"INFO"}, say("The studio is in the collection {name}", name=made.name))
+        add_studio(self, context, self.use_scene_camera)
         return {"FINISHED"}
 
 

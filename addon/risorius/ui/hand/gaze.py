@@ -5,7 +5,7 @@
 
 import bpy
 
-from ...scene.animation import keying
+from ...scene.animation import keying, tweaks
 from ...scene.base import parts
 from ...scene.character import board, rig_placement, runtime
 from ...scene.frame import evaluate, joint_turns
@@ -23,6 +23,19 @@ TARGETS = (
 )
 
 
+def proposed(context: Context) -> str:
+    """The object that eyes are most likely to look at: the one in hand, else the camera; or "".
+
+    Args:
+        context: has the selection and the scene.
+    """
+    chosen = [context.object, *context.selected_objects]
+    free = [item for item in chosen if item is not None and parts.rig_of(item) is None]
+    free.sort(key=lambda item: item.type != "EMPTY")  # made for this, and it stays sorted
+    item = free[0] if free else context.scene.camera
+    return item.name if item is not None else ""
+
+
 class RISORIUS_OT_gaze_target(FaceOperator, Operator):
     """What the eyes' target follows"""
 
@@ -37,8 +50,7 @@ class RISORIUS_OT_gaze_target(FaceOperator, Operator):
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if self.mode != "OBJECT":
             return self.execute(context)
-        camera = context.scene.camera
-        self.target = self.target or (camera.name if camera is not None else "")
+        self.target = self.target or proposed(context)
         return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, context: Context) -> None:
@@ -122,8 +134,9 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
         blink = blinks.Blink(
             self.close, self.hold, self.open, self.strength, self.offset, self.sides
         )
+        above = self.kind == "LAYER" or tweaks.of(controls) is not None
         for frame in frames:
-            if self.kind == "LAYER":
+            if above:
                 blinks.add_to_layer(rig, frame, blink)
             else:
                 blinks.key(rig, frame, blink, keying.rules_of(context, auto=False, exact=True))

@@ -9,10 +9,11 @@ import bpy
 
 from ... import native
 from ...logic.base.errors import FaceError
-from ...scene.animation import curve_colours, keying, tweaks
+from ...scene.animation import curve_colours, keying, tweak_guard
 from ...scene.base import compat, parts
 from ...scene.frame import evaluate
 from ...scene.hand import between
+from ...scene.live import sessions
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
 from ..words import of_error, say
@@ -20,6 +21,7 @@ from .base import HandOperator
 from .favourites import favourites_of
 
 _REACH = 0.3  # of a window's width: how far the mouse goes from nothing to all
+_AROUND = 12  # frames on each side of the current one
 _NONE = 0.5  # of a breakdown: in the middle
 
 
@@ -186,6 +188,23 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
             context.area.header_text_set(None)
 
 
+def proposed_range(context: Context) -> tuple[int, int]:
+    """First and last frame of a tweak: of selected keys, of the preview, else around this frame.
+
+    Where all keys are selected nobody chose them: an import selects what it makes.
+
+    Args:
+        context: has the face and the scene.
+    """
+    controls, scene = face_controls(context), context.scene
+    selected = keying.selected_frames(controls)
+    if len(selected) > 1 and len(selected) < len(between.key_frames(controls)):
+        return round(selected[0]), round(selected[-1])
+    if scene.use_preview_range:
+        return scene.frame_preview_start, scene.frame_preview_end
+    return scene.frame_current - _AROUND, scene.frame_current + _AROUND
+
+
 class RISORIUS_OT_tweak(FaceOperator, Operator):
     """Tweak a range of frames in a layer of its own, which touches no key; again: end the tweak"""
 
@@ -202,21 +221,21 @@ class RISORIUS_OT_tweak(FaceOperator, Operator):
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.enable:
             return self.execute(context)
-        selected, scene = keying.selected_frames(face_controls(context)), context.scene
-        self.first, self.last = scene.frame_current - 12, scene.frame_current + 12
-        if len(selected) > 1:
-            self.first, self.last = round(selected[0]), round(selected[-1])
-        elif scene.use_preview_range:
-            self.first, self.last = scene.frame_preview_start, scene.frame_preview_end
+        self.first, self.last = proposed_range(context)
         return context.window_manager.invoke_props_dialog(self)
 
     def execute(self, context: Context) -> Result:
         controls = face_controls(context)
+        if self.enable and sessions.of(controls) is not None:
+            self.report(
+                {"ERROR"}, say("Live capture moves the sliders of this face: stop it first.")
+            )
+            return {"CANCELLED"}
         try:
             if self.enable:
-                tweaks.begin(controls, self.first, self.last, self.fade)
+                tweak_guard.begin(controls, self.first, self.last, self.fade)
             else:
-                tweaks.end(controls)
+                tweak_guard.end(controls)
         except FaceError as error:
             self.report({"ERROR"}, of_error(error))
             return {"CANCELLED"}

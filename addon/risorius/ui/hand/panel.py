@@ -2,8 +2,7 @@
 """The panel By Hand: from key to key, between poses, a tweak over a range."""
 
 from ...scene.animation import tweaks
-from .. import words
-from ..blender_types import Context, Panel, UILayout
+from ..blender_types import Context, Panel
 from ..common import FaceOnlyPanel, face_controls
 
 
@@ -21,25 +20,9 @@ class RISORIUS_PT_hand(FaceOnlyPanel, Panel):
         row = layout.row(align=True)
         row.operator("risorius.breakdown", text="Relax or Push").kind = "NEIGHBOURS"
         row.operator("risorius.breakdown", text="To Rest").kind = "REST"
-        _draw_tweak(layout, tweaks.of(face_controls(context)))
+        on = tweaks.of(face_controls(context)) is not None
+        layout.operator("risorius.tweak", icon="MOD_TIME", depress=on).enable = not on
         layout.operator("risorius.colour_curves", icon="COLOR")
-
-
-def _draw_tweak(layout: UILayout, tweak: tweaks.Tweak | None) -> None:
-    button = layout.operator("risorius.tweak", icon="MOD_TIME", depress=tweak is not None)
-    button.enable = tweak is None
-    if tweak is None:
-        return
-    words.write(
-        layout,
-        words.say(
-            "A tweak is on from frame {first:g} to {last:g}. Move sliders there and press Key: "
-            "the change goes into its layer, the keys below stay.",
-            first=tweak.first,
-            last=tweak.last,
-        ),
-        "INFO",
-    )
 
 
 CLASSES = (RISORIUS_PT_hand,)

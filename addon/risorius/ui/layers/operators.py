@@ -61,7 +61,8 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
             if self.source not in known:
                 self.report({"ERROR"}, say("There is no expression {name}.", name=self.source))
                 return {"CANCELLED"}
-            layers.add(controls, "EXPRESSION", known[self.source].label, expression=self.source)
+            label, when = known[self.source].label, {"start": frame, "extend": "HOLD_FORWARD"}
+            layers.add(controls, "EXPRESSION", label, expression=self.source, **when)
         else:
             layers.add(controls, "IDLE", "Idle Life", start=frame, blend="MAXIMUM")
         evaluate.bring_up(context, rig)

@@ -10,7 +10,8 @@ import bpy
 from ... import native
 from ...logic.base import names
 from ...logic.base.errors import FaceError
-from ...scene.animation import clip_actions
+from ...scene.animation import clip_actions, tweaks
+from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import board
 from ...scene.live import capture, recordings, sessions
@@ -61,6 +62,9 @@ class RISORIUS_OT_live_start(Operator):
         return True
 
     def execute(self, context: Context) -> Result:
+        if tweaks.of(parts.controls_there(face_rig(context))) is not None:
+            self.report({"ERROR"}, say("A tweak is on: choose Done at the top of the tab first."))
+            return {"CANCELLED"}
         try:
             capture.start(face_rig(context), settings_of(context))
         except native.user_errors() as error:
@@ -246,7 +250,7 @@ def _finish(
         return False
     operator.report({"INFO"}, say(report.summary()))
     for note in report.notes:
-        operator.report({"WARNING"}, note)
+        operator.report({"WARNING"}, say(note))
     return True
 
 

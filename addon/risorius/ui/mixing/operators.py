@@ -3,6 +3,7 @@
 # pyright: reportInvalidTypeForm=false
 """Operators of Mix Faces: which faces, the preview, the file."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import bpy
@@ -17,12 +18,27 @@ from ..file.import_operators import import_character
 from ..words import of_error, say
 from .properties import choices, follow, paths_of, shares_of
 
-# Why pictures are one face's own; those of hair are so by intent.
-_NOT_MIXED = {
-    "missing": "Not mixed, as not every face has them: {names}",
-    "format": "Not mixed, as Risorius mixes its own kind of PNG alone: {names}",
-    "size": "Not mixed, as the faces have them in different sizes: {names}",
-}
+
+def _not_mixed(own: Mapping[str, str]) -> list[str]:
+    """Sentences on pictures that are one face's own. Hair's are so by intent and get none.
+
+    Args:
+        own: names of pictures, each with the reason.
+    """
+
+    def names(why: str) -> str:
+        return ", ".join(name for name, found in own.items() if found == why)
+
+    texts = {
+        "missing": say("Not mixed, as not every face has them: {names}", names=names("missing")),
+        "format": say(
+            "Not mixed, as Risorius mixes its own kind of PNG alone: {names}", names=names("format")
+        ),
+        "size": say(
+            "Not mixed, as the faces have them in different sizes: {names}", names=names("size")
+        ),
+    }
+    return [text for why, text in texts.items() if names(why)]
 
 
 def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
@@ -172,9 +188,8 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
             name = getattr(error, "filename", None) or self.filepath
             self.report({"ERROR"}, explain(name, error))
             return {"CANCELLED"}
-        for why, text in _NOT_MIXED.items():
-            if names := ", ".join(name for name, found in own.items() if found == why):
-                self.report({"WARNING"}, say(text, names=names))
+        for text in _not_mixed(own):
+            self.report({"WARNING"}, text)
         if not self.use_import:
             return {"FINISHED"}
         parents.hide(context)

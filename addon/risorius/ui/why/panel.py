@@ -11,7 +11,6 @@ from ...scene.why import causes, heat, present
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, face_controls, face_rig
-from .overlay import look_in_words
 from .properties import choices
 from .spoken import spoken, title
 
@@ -31,8 +30,6 @@ class RISORIUS_PT_why(FaceOnlyPanel, Panel):
             words.write(layout, "This face shows no controls now.", "INFO")
             return
         look = look_masks.of(rig)
-        if not look.is_whole:
-            _draw_left_out(layout, context, look)
         _draw_mutes(layout, look)
         _draw_heat(layout, rig, context)
         _draw_vertex(layout, context, rig)
@@ -46,24 +43,15 @@ class RISORIUS_PT_why(FaceOnlyPanel, Panel):
             _draw_strongest(body, context, rig)
 
 
-def _draw_left_out(layout: UILayout, context: Context, look: look_masks.Look) -> None:
-    box = layout.box()
-    box.alert = True
-    words.write(box, look_in_words(context, look), "ERROR")
-    box.alert = False
-    box.operator("risorius.show_all", icon="LOOP_BACK")
-    row = box.row()
-    row.operator("risorius.mask_renders", depress=look.in_renders).enable = not look.in_renders
-    if not look.in_renders:
-        words.write(box, "Renders, keys and exports have the whole face.")
-
-
 def _draw_mutes(layout: UILayout, look: look_masks.Look) -> None:
     row = layout.row(align=True)
     row.label(text="Mute", text_ctxt=words.CONTEXT)
     for kind, text in (("JOINTS", "Joints"), ("SHAPES", "Shapes"), ("MAPS", "Maps")):
         button = row.operator("risorius.mute", text=text, depress=kind in look.muted)
         button.kind, button.enable = kind, kind not in look.muted
+    row = layout.row()
+    row.enabled = not look.is_whole  # there at all times: nothing moves when a control is alone
+    row.operator("risorius.mask_renders", depress=look.in_renders).enable = not look.in_renders
 
 
 def _draw_heat(layout: UILayout, rig: ArmatureObject, context: Context) -> None:
@@ -76,8 +64,9 @@ def _draw_heat(layout: UILayout, rig: ArmatureObject, context: Context) -> None:
     ).kind = "POSE"
     if shown is not None:
         row.operator("risorius.heat", text="", icon="X").kind = "OFF"
-        words.show(column, words.say(title(context, rig, shown)))
-        words.show(column, words.say("0 (violet) to {most:.2f} mm (yellow)", most=shown.most))
+    scale = "0 (violet) to {most:.2f} mm (yellow)"
+    words.show(column, words.say(title(context, rig, shown)) if shown is not None else "")
+    words.show(column, words.say(scale, most=shown.most) if shown is not None else "")
     controls = face_controls(context)
     for place, layer in layers.ordered(controls):
         depress = shown is not None and (shown.kind, shown.what) == ("LAYER", str(place))

@@ -20,6 +20,9 @@ from .surface import Doubles
 _REST, _MOVES, _BOUND = 0, 1, 2
 _MOST_STEPS = 600
 _END = 1e-6  # of the price at which the first moves: where the path counts as walked to its end
+# Of the whole way: a target so far out of reach counts as such; of what can be gained: so little may
+# be missed there for the sake of few; of the first price: where the rest is looked at.
+_FAR, _LITTLE, _CALM = 0.1, 0.1, 0.12
 _LEVEL = 1e-9  # what differs by less than this from a slope is as steep
 
 
@@ -159,6 +162,7 @@ def cheapest_change(
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
     nodes, end, alone = [(path.x.copy(), path.missing)], _END * path.price, -1.0
+    calm, prices = _CALM * path.price, [path.price]
     for _ in range(_MOST_STEPS):
         if path.price <= end:
             break
@@ -166,9 +170,26 @@ def cheapest_change(
         if began >= 0 and elsewhere[began] and alone < 0:
             alone = float(np.linalg.norm(path.missing))
         nodes.append((path.x.copy(), path.missing))
-    aim = float(np.linalg.norm(path.missing))
+        prices.append(path.price)
+    nearest = aim = float(np.linalg.norm(path.missing))
     aim = aim + tolerance if alone < 0 else min(alone + tolerance, aim + max(worth, tolerance))
+    way, near = float(np.linalg.norm(b)), nearest if alone < 0 else alone
+    if nearest > _FAR * way and near - nearest <= _FAR * way:
+        # Out of reach: controls that hardly help any more are left alone.
+        there = _at_price(nodes, prices, calm)
+        aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
     return np.clip(_where(nodes, aim) / price, low, high)  # rounding must not leave the bounds
+
+
+def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: float) -> float:
+    """How much is missing where the price has fallen so far."""
+    for (_, long), (_, short), before, after in zip(
+        nodes, nodes[1:], prices, prices[1:], strict=False
+    ):
+        if after <= price:
+            share = (before - price) / (before - after) if before > after else 1.0
+            return float(np.linalg.norm(long + min(max(share, 0.0), 1.0) * (short - long)))
+    return float(np.linalg.norm(nodes[-1][1]))
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys of a face are seen in the animation editors.
+
+These show keys of selected objects alone, and of a bone only while it is selected. Whatever keys a
+face calls `show`; what was selected before stays so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..base import compat, parts
+from ..base.blender_types import ArmatureObject, Context, current_context
+from . import armatures
+
+# Uid of a control armature -> uid of the action that it plays, and how many keys its sliders have.
+_counts: dict[int, tuple[int, int]] = {}
+
+
+def forget() -> None:
+    """After load and undo session uids may mean others."""
+    _counts.clear()
+
+
+def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
+    """Let the animation editors show keys that a face just got.
+
+    The bone of the sliders is selected: it is locked, and no hand moves it by accident. Handles of
+    a face board are selected only where none of those that were keyed is, and so are other bones.
+
+    Args:
+        controls: control armature of the face.
+        paths: data paths that were keyed, from it.
+    """
+    show_object(current_context(), controls)
+    bones = controls.pose.bones
+    keyed = {path.split('"')[1] for path in paths if path.startswith("pose.bones")} & set(
+        bones.keys()
+    )
+    if parts.FACE in keyed:
+        compat.select_bone(bones[parts.FACE])
+    handles = {name for name in keyed if parts.BOARD in controls.data.bones[name]}
+    for group in (handles, keyed):
+        if not any(compat.is_bone_selected(bones[name]) for name in group):
+            for name in group:
+                compat.select_bone(bones[name])
+
+
+def show_some(controls: ArmatureObject) -> None:
+    """Select the bone of the sliders where no bone is selected and all keys would be hidden.
+
+    Args:
+        controls: control armature of a face.
+    """
+    bones = controls.pose.bones
+    if not any(compat.is_bone_selected(bone) for bone in bones):
+        compat.select_bone(bones[parts.FACE])
+
+
+def show_object(context: Context, controls: ArmatureObject) -> None:
+    """Select the controls beside what is selected, in pose mode too where the active object is.
+
+    Args:
+        context: a Blender context.
+        controls: control armature of a face.
+    """
+    layer = context.view_layer
+    if layer is None or controls.name not in layer.objects:
+        return
+    if not controls.select_get(view_layer=layer):
+        controls.select_set(True, view_layer=layer)
+    active = layer.objects.active
+    if active is None:
+        layer.objects.active = controls
+    elif active.mode == "POSE" and controls.mode == "OBJECT":
+        armatures.join_pose_mode(context, controls)
+
+
+def note_edit(controls: ArmatureObject) -> None:
+    """Show keys of sliders that Blender's own operators inserted: there are more of them now.
+
+    Args:
+        controls: a control armature whose action was edited.
+    """
+    data = controls.animation_data
+    action = data.action if data is not None else None
+    uid, count = 0, 0
+    if action is not None:
+        start, uid = parts.property_path("")[:-3], action.session_uid
+        curves = compat.curves_for(action, controls)
+        count = sum(len(c.keyframe_points) for c in curves if c.data_path.startswith(start))
+    before = _counts.get(controls.session_uid)
+    _counts[controls.session_uid] = uid, count
+    if before is None or count <= before[1] or before[0] not in (0, uid):
+        return
+    layer = current_context().view_layer
+    if layer is not None and controls.name in layer.objects:
+        controls.select_set(True, view_layer=layer)
+    compat.select_bone(controls.pose.bones[parts.FACE])

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The line at the top of the tab: whose face it is, or the mode that is on, with what ends it.
+
+It is one line in every mode, so that nothing below it moves.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from ...logic.character import slider_words
+from ...scene.animation import tweak_guard, tweaks
+from ...scene.base import parts
+from ...scene.base.blender_types import ArmatureObject
+from ...scene.character import board, sides
+from ...scene.frame import look_masks
+from ...scene.live import sessions
+from ...scene.why import heat
+from .. import words
+from ..blender_types import Context, Icon, UILayout
+from ..common import as_seen
+
+_NAMED = 2  # controls that stand alone, by their names
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode that a face can be in, in which the same hand does something else.
+
+    Attributes:
+        text: its name, in the user's language.
+        icon: before it.
+        operator: what ends it.
+        settings: properties of that.
+        alert: whether the face is not seen, or not keyed, as one may think.
+    """
+
+    text: str
+    icon: Icon
+    operator: str
+    settings: Mapping[str, object] = field(default_factory=dict)
+    alert: bool = False
+
+
+def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> list[Mode]:
+    """The modes that are on, those first that change most of what a hand does.
+
+    Args:
+        context: has the current frame.
+        rig, controls: the armatures of the face.
+    """
+    return [*_of_keys(context, rig, controls), *_of_looks(context, rig, controls)]
+
+
+def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
+    """What says where edits and keys go."""
+    session = sessions.of(controls)
+    if session is not None and session.recording is not None:
+        yield Mode(words.say("Recording"), "REC", "risorius.live_record", alert=True)
+    elif session is not None:
+        yield Mode(words.say("Live Capture"), "PLAY", "risorius.live_stop")
+    if parts.BAKED in rig or parts.BAKED in controls:
+        yield Mode(words.say("Baked"), "ACTION", "risorius.unbake")
+    tweak = tweaks.of(controls)
+    if tweak is not None:
+        here = tweak.weight(context.scene.frame_current_final) > 0.0
+        said = "Tweak {first:g}-{last:g}" if here else "Tweak {first:g}-{last:g}: not at this frame"
+        text = words.say(said, first=tweak.first, last=tweak.last)
+        trouble = not here or bool(tweak_guard.trouble(controls))
+        yield Mode(text, "MOD_TIME", "risorius.tweak", {"enable": False}, trouble)
+    if board.leads_face(rig):
+        yield Mode(words.say("The board leads"), "BONE_DATA", "risorius.lead", {"by": "SLIDERS"})
+
+
+def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
+    """What says how the face is shown, and which sliders go together."""
+    look = look_masks.of(rig)
+    if look.solo:
+        swapped = as_seen(context)
+        names = sorted(
+            slider_words.title_in_region(label, "", swapped=swapped) for label in look.solo
+        )
+        shown = ", ".join(names) if len(names) <= _NAMED else str(len(names))
+        text = words.say("Solo: {names}", names=shown)
+        yield Mode(text, "SOLO_ON", "risorius.show_all", alert=True)
+    elif look.muted:
+        yield Mode(words.say("Muted"), "HIDE_ON", "risorius.show_all", alert=True)
+    if heat.of(rig) is not None:
+        yield Mode(words.say("Heat Map"), "SHADING_RENDERED", "risorius.heat", {"kind": "OFF"})
+    if sides.followers(controls):
+        yield Mode(words.say("Sides Linked"), "LINKED", "risorius.link_sides", {"enable": False})
+
+
+def draw(layout: UILayout, context: Context, rig: ArmatureObject, controls: ArmatureObject) -> None:
+    """The line.
+
+    Args:
+        layout: of the panel.
+        context: of it.
+        rig, controls: the armatures of the face.
+    """
+    row, found = layout.row(align=True), modes(context, rig, controls)
+    if not found:
+        words.show(row, parts.title_of(rig), "USER")
+        return
+    mode = found[0]
+    row.alert = mode.alert
+    more = words.say("{mode} and {count} more", mode=mode.text, count=len(found) - 1)
+    words.show(row, more if found[1:] else mode.text, mode.icon)
+    button = row.operator(mode.operator, text="Done")
+    for name, value in mode.settings.items():
+        setattr(button, name, value)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How many lines a panel takes: what changes while one clicks must not move what is below."""
+
+from types import SimpleNamespace
+
+import bpy
+
+_LEAVES = ("label", "prop", "operator", "progress", "menu", "popover", "prop_search", "separator")
+_LEAVES += ("operator_menu_enum", "template_list", "prop_enum")
+
+
+class Lines:
+    """Stands in for a UILayout and counts its lines: a row is as high as its highest part."""
+
+    def __init__(self, beside=False):
+        object.__setattr__(self, "_beside", beside)
+        object.__setattr__(self, "_parts", [])
+
+    def __setattr__(self, _name, _value):
+        """Options of a layout or of an operator button."""
+
+    @property
+    def count(self):
+        counts = [part if isinstance(part, int) else part.count for part in self._parts]
+        return max(counts, default=0) if self._beside else sum(counts)
+
+    def _part(self, part):
+        self._parts.append(part)
+        return part
+
+    def panel(self, *_arguments, **_options):
+        """Header and body of a section, which is open."""
+        return self._part(Lines(beside=True)), self._part(Lines())
+
+    def __getattr__(self, name):
+        if name in _LEAVES:
+            self._parts.append(1)
+            return lambda *_a, **_o: SimpleNamespace()
+        return lambda *_a, **_o: self._part(Lines(beside=name in ("row", "split", "grid_flow")))
+
+
+def lines_of(panel):
+    """How many lines a panel takes now, with all its sections open."""
+    layout = Lines()
+    panel.draw(SimpleNamespace(layout=layout), bpy.context)
+    return layout.count
