@@ -17,7 +17,7 @@ MODES = {
         lambda: bpy.ops.risorius.tweak(first=5, last=20),
         "Tweak 5-20: not at this frame",
     ),
-    "solo": (lambda: bpy.ops.risorius.solo(control=JAW), "Solo: jawOpen"),
+    "solo": (lambda: bpy.ops.risorius.solo(control=JAW), "Solo: Jaw Open"),
     "mute": (lambda: bpy.ops.risorius.mute(kind="JOINTS"), "Muted"),
     "heat": (lambda: bpy.ops.risorius.heat(kind="POSE"), "Heat Map"),
     "baked": (bpy.ops.risorius.bake, "Baked"),
@@ -87,7 +87,7 @@ def test_two_modes_are_counted_and_two_faces_told_apart(rig, dna_file):
     assert header() == []
     bpy.ops.risorius.heat(kind="POSE")
     bpy.ops.risorius.solo(control=JAW)
-    assert drawn(bpy.types.RISORIUS_PT_character).labels[0] == "Solo: jawOpen and 1 more"
+    assert drawn(bpy.types.RISORIUS_PT_character).labels[0] == "Solo: Jaw Open and 1 more"
     assert header() == ["Small"]
     bpy.ops.risorius.show_all()
     bpy.ops.risorius.heat(kind="OFF")

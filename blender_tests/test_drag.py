@@ -177,13 +177,16 @@ def test_handles_lie_apart_on_both_sides(man):
 
 
 def two_handles(rig):
-    """Two handles of the mouth, one on each side: mesh and vertex."""
-    picking = scene.submodule("scene.drag.picking")
-    live = scene.submodule("scene.character.runtime").of(rig)
-    found = [(p, at) for p, at in picking.handles_of(bpy.context, rig, live)]
-    low = sorted(found, key=lambda one: one[1][2])[:9]  # of the lower half of the face
-    left = max(low, key=lambda one: one[1][0])[0]
-    right = min(low, key=lambda one: one[1][0])[0]
+    """The handles that a smile moves most, one on each side of the mouth: mesh and vertex."""
+    rest = {point: place(rig, point[1], point[0]) for point in offered(rig)}
+
+    def most(name):
+        scene.set_controls(rig, **{name: 1.0})
+        moved = {p: np.linalg.norm(place(rig, p[1], p[0]) - at) for p, at in rest.items()}
+        scene.set_controls(rig, **{name: 0.0})
+        return max(moved, key=moved.get)
+
+    left, right = most("mouthCornerPullL"), most("mouthCornerPullR")
     assert left != right
     return left, right
 

@@ -299,8 +299,12 @@ def test_a_second_batch_in_a_folder_is_told_who_works_there(tmp_path):
     jobs = make(tmp_path / "j", clips=4, frames=1500)
     first = start(jobs)
     wait_for_outputs(jobs, first)
+    if os.name != "nt":
+        first.send_signal(signal.SIGSTOP)  # or it may end while the second still begins
     second = start(jobs)
     error = second.communicate()[1].decode()
+    if os.name != "nt":
+        first.send_signal(signal.SIGCONT)
     assert second.returncode == 1
     assert len(error.splitlines()) == 1
     assert f"out: process {first.pid} on {socket.gethostname()}, since " in error

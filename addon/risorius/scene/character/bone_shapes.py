@@ -168,7 +168,8 @@ def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
 
 def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]:
     """Radius in lengths of the bone, and the way from its head in its own space."""
-    length, head = bone.length, bone.head_local
+    # A face of one point, or one as large as numbers go, has bones of no length.
+    length, head = bone.length or 1.0, bone.head_local
     if name == "head":  # a ring above the hair
         radius = 0.9 * room.wide
         return radius / length, Vector((0.0, room.top - head.z + 0.25 * radius, 0.0))

@@ -55,6 +55,7 @@ class RISORIUS_MT_face(Menu):
 def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
     """What the hand does most."""
     layout.operator("risorius.reset", icon="LOOP_BACK").region = ""
+    layout.operator("risorius.rest_others")
     layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
     layout.menu("RISORIUS_MT_expressions", icon="MONKEY")
     tweaked = controls is not None and tweaks.of(controls) is not None
