@@ -21,7 +21,14 @@ from risorius.files import fileio
 
 CORE = GOLDEN / "core.dna"
 # A command that says when it listens to signals: before, Python itself would answer them.
-READY = "import sys, risorius.cli as c; print('ready', flush=True); sys.exit(c.main(sys.argv[1:]))"
+# As the program does, it hears no interrupt once the work is done.
+READY = """
+import signal, sys, risorius.cli as c
+print("ready", flush=True)
+code = c.main(sys.argv[1:])
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+sys.exit(code)
+"""
 CPU_SECONDS = 60
 MOST_LINES = 12
 

@@ -21,7 +21,10 @@ def main() -> int:
 
     if hears:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    return command()
+    code = command()
+    if hears:  # the work is done: an interrupt while Python ends changes nothing any more
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return code
 
 
 def _end(_number: int, _frame: object) -> None:

@@ -20,9 +20,9 @@ from .surface import Doubles
 _REST, _MOVES, _BOUND = 0, 1, 2
 _MOST_STEPS = 600
 _END = 1e-6  # of the price at which the first moves: where the path counts as walked to its end
-# Of the whole way: a target so far out of reach counts as such; of what can be gained: so little may
-# be missed there for the sake of few; of the first price: where the rest is looked at.
-_FAR, _LITTLE, _CALM = 0.1, 0.1, 0.12
+_FAR = 0.1  # of the whole way: a target that stays farther away than this is out of reach
+_LITTLE = 0.1  # of what can be gained: what may be missed there for the sake of few controls
+_CALM = 0.12  # of the first price: from there on controls hardly help with such a target
 _LEVEL = 1e-9  # what differs by less than this from a slope is as steep
 
 
