@@ -42,7 +42,7 @@ def _banner(rig):
 
 
 def _done(mode):
-    """What a click on Done does."""
+    """The effect of a click on Done."""
     return getattr(bpy.ops.risorius, mode.operator.partition(".")[2])(**mode.settings)
 
 

@@ -69,7 +69,7 @@ def press_i(rig, name=JAW, frame=20):
 
 
 def ask(rig, wanted, name=JAW):
-    """Move a slider until the face shows what is wanted."""
+    """Move a slider until the face shows the wanted pose."""
     offset = shown(rig, name=name) - scene.face(rig)[PREFIX + name]
     scene.set_controls(rig, **{name: wanted - offset})
 

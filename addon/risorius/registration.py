@@ -153,7 +153,7 @@ def register() -> None:
 
 
 def before_gltf(settings: Mapping[str, object]) -> None:
-    """What is done before Blender's own glTF exporter writes.
+    """Called before Blender's own glTF exporter writes.
 
     Args:
         settings: the exporter's.

@@ -311,7 +311,7 @@ class Round:
                     (folder / word).write_text("old")
 
     def faults(self, folder: Path) -> list[str]:
-        """Run the command in the folder; what is wrong with how it ended."""
+        """Run the command in the folder. Returns complaints about its end."""
         before = _contents(folder)
         memory, began = _begin_peak(), time.process_time()
         signal.setitimer(signal.ITIMER_PROF, 3 * CPU_SECONDS)  # ends the process

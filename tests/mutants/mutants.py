@@ -241,7 +241,7 @@ class Copy:
                     command, cwd=self.root, env=environment, stdin=subprocess.DEVNULL,
                     stdout=printed, stderr=subprocess.STDOUT, start_new_session=True,
                 )  # fmt: skip
-                with contextlib.suppress(ProcessLookupError):  # what it starts has the limit too
+                with contextlib.suppress(ProcessLookupError):  # its children inherit it
                     resource.prlimit(process.pid, resource.RLIMIT_CPU, (int(limit),) * 2)
                 try:
                     code = process.wait(WAITS * limit)

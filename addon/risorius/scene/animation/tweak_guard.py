@@ -33,7 +33,7 @@ Curves = dict[CurveName, bpy.types.FCurve]
 
 @dataclass
 class _Hand:
-    """What stands elsewhere than the keys below say, and has no key.
+    """Sliders that differ from the keys below and have no key.
 
     Attributes:
         frame: of the scene.
@@ -108,7 +108,7 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Take keys that landed below the tweak into it, and note what was moved without a key.
+    """Take keys that landed below the tweak into it, and note moves without a key.
 
     Args:
         controls: a control armature that was edited.
@@ -130,7 +130,7 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def settle(controls: ArmatureObject) -> None:
-    """Take what was moved without a key into the tweak; outside of the tweak it is let go.
+    """Take moves without a key into the tweak; outside of its range they are dropped.
 
     Args:
         controls: a control armature; its frame may have changed since.
@@ -263,7 +263,7 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """What stands elsewhere than the keys below say; None for nothing, and beside NLA strips."""
+    """Sliders that differ from the keys below; None for none, and beside NLA strips."""
     data, rig = controls.animation_data, parts.rig_of(controls)
     if rig is None or (data is not None and _is_mixed(data)):
         return None

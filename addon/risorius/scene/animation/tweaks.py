@@ -169,7 +169,7 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
 
 
 def sliders_below(controls: ArmatureObject, tweak: Tweak, frame: float) -> dict[str, float]:
-    """What the sliders stand at without the tweak, by their names.
+    """Values of the sliders without the tweak, by name.
 
     Args:
         controls: the control armature.

@@ -81,7 +81,7 @@ def words(rig: ArmatureObject) -> str:
 
 
 def _kept(owner: ArmatureObject) -> Mapping[str, object]:
-    """What a bake noted on an armature; empty where that is no table of ours."""
+    """The notes of a bake on an armature; empty where they are no table of ours."""
     return saved.table(owner, parts.BAKED) or {}
 
 

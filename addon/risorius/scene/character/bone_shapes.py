@@ -135,7 +135,7 @@ def disc(name: str) -> bpy.types.Object:
 
 
 def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
-    """Turn and size the outline so that it stands beside what the bone turns, and colour it.
+    """Turn and size the outline so that it stands beside the turned part, and colour it.
 
     From the front nothing lies over the eyes, and what Blender frames with the bones is the head.
 

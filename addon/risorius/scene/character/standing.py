@@ -29,7 +29,7 @@ class Standing:
 
     @property
     def sentence(self) -> Sentence | None:
-        """What the user is told of it; None where there is nothing to tell."""
+        """The sentence for the user; None where there is nothing to tell."""
         values = {**self.sliders, **dict.fromkeys(self.handles)}
         if not values:
             return None

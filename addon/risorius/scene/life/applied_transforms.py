@@ -30,7 +30,7 @@ _BY_HAND = ("EDIT", "SCULPT")  # modes in which the user moves points
 
 @dataclass(frozen=True)
 class _Seen:
-    """What a part had when it was last looked at.
+    """The state of a part at the last look.
 
     Attributes:
         own: its matrix, without parent and constraints.
@@ -48,7 +48,7 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Moved:
-    """A part with its places in the world before and after a step, and what it had before it."""
+    """A part, its places in the world before and after a step, and its state before it."""
 
     item: bpy.types.Object
     before: _Seen
@@ -68,7 +68,7 @@ def forget() -> None:
 
 
 def last_said(rig: ArmatureObject) -> Sentence | None:
-    """What was taken back at the last step. Args: rig  deforming armature of the face."""
+    """The sentence on the last step that was taken back. Args: rig  deforming armature."""
     return _said.get(rig.session_uid)
 
 
@@ -121,7 +121,7 @@ def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
 
 
 def _see(item: bpy.types.Object, before: _Seen | None, touched: AbstractSet[bpy.types.ID]) -> _Seen:
-    """What a part has now; points are read only where something says that they changed."""
+    """The state of a part now; points are read only where a change was noted."""
     if before is not None and item not in touched:
         return before
     parent, data = item.parent.session_uid if item.parent is not None else 0, item.data
@@ -184,7 +184,7 @@ def _local(seen: _Seen) -> Matrix:
 
 
 def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object]) -> bool:
-    """Undo what was done to one part; returns whether something was."""
+    """Undo the changes of one part. Returns whether there were any."""
     item, before = moved.item, moved.before
     if before.parent != now.parent:
         return False

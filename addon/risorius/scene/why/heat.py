@@ -42,7 +42,7 @@ _PAUSE = 0.15  # seconds between two looks at whether the pose is another one
 
 @dataclass(frozen=True)
 class Heat:
-    """What a heat map shows.
+    """The title of a heat map.
 
     Attributes:
         kind: CONTROL: how far a control reaches from neutral, POSE: how far the pose of now is

@@ -130,7 +130,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     time_unit: bpy.props.EnumProperty(
         name="Time Unit",
-        description="What the times of a table or a JSON count in",
+        description="Unit of the times in a table or a JSON file",
         items=TIME_UNITS,
     )
     full_value: bpy.props.FloatProperty(
@@ -141,7 +141,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         soft_max=255.0,
     )
     angles: bpy.props.EnumProperty(
-        name="Angles", description="What the file's angles of head and eyes are in", items=ANGLES
+        name="Angles", description="Unit of the file's angles of head and eyes", items=ANGLES
     )
     gain: bpy.props.FloatProperty(
         name="Gain", description="Factor of all controls", default=1.0, min=0.0, soft_max=2.0

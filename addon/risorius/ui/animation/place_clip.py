@@ -113,7 +113,7 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Bring what the animation does not move to rest, or say that it stays as it was."""
+        """Bring controls that the animation does not move to rest, or say that they stay."""
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:

@@ -31,7 +31,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
 
 
 def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
-    """What the panel says of a face that is late.
+    """The sentence of the panel on a late face.
 
     Args:
         layout: of the panel.

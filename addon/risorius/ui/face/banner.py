@@ -42,7 +42,7 @@ class Mode:
 
 
 def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> list[Mode]:
-    """The modes that are on, those first that change most of what a hand does.
+    """The modes that are on; modes that change most edits come first.
 
     Args:
         context: has the current frame.

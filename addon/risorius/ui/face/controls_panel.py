@@ -121,7 +121,7 @@ def _draw_region_header(layout: UILayout, region: str) -> None:
 
 
 class _Part(NamedTuple):
-    """What is drawn of a region, see `draw_sliders`."""
+    """The lines of a region, see `draw_sliders`."""
 
     context: Context
     face: bpy.types.PoseBone

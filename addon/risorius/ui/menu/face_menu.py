@@ -53,7 +53,7 @@ class RISORIUS_MT_face(Menu):
 
 
 def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
-    """What the hand does most."""
+    """The most frequent actions."""
     layout.operator("risorius.reset", icon="LOOP_BACK").region = ""
     layout.operator("risorius.rest_others")
     layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
@@ -76,7 +76,7 @@ def draw_header(self: Menu, context: Context) -> None:
 
 
 def register() -> None:
-    """Put the menu behind those of Blender."""
+    """Add the menu after Blender's own menus."""
     bpy.types.VIEW3D_MT_editor_menus.append(draw_header)
 
 

@@ -26,7 +26,7 @@ def spoken(context: Context, name: str) -> str:
 
 
 def title(context: Context, rig: ArmatureObject, shown: heat.Heat) -> str:
-    """What a heat map shows.
+    """The title of a heat map.
 
     Args:
         context: has the preferences.

@@ -197,7 +197,7 @@ def _inside(value: float, found: object, low: float, high: float, *, above: bool
 
 
 def _range(value: float, low: float, high: float, above: bool = False) -> str:
-    """What was expected of a number that is outside."""
+    """The expected range, in words."""
     bounded = high < (MOST if isinstance(high, int) else LARGEST)
     if above and low == 0:
         return "more than 0" + (f", at most {_plain(high)}" if bounded else "")

@@ -75,7 +75,7 @@ def open_file(path: str | os.PathLike[str]) -> BufferedReader:
 
 
 def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
-    """What is left in a stream, read in pieces.
+    """The rest of a stream, read in pieces.
 
     Args:
         file: open for reading.

@@ -105,7 +105,7 @@ _TEXTS = (
 
 
 def kind_of(data: bytes) -> Kind | None:
-    """What a file is by its bytes, or None where they do not tell.
+    """The kind of a file by its bytes, or None where they do not show it.
 
     Args:
         data: the file, or what `ends_of` reads of it.
@@ -122,7 +122,7 @@ def kind_of(data: bytes) -> Kind | None:
 
 
 def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
-    """What a file is, unless the reader takes such files.
+    """The kind of a file, unless the reader takes files of that kind.
 
     Args:
         data: as of `kind_of`.

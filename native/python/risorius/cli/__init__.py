@@ -90,7 +90,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """What was typed; `func` is the command.
+    """The parsed command line; `func` is the command.
 
     Raises:
         CommandLineError: an option has no such value.

@@ -179,7 +179,7 @@ def load(args: argparse.Namespace) -> importing.Imported:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before anything is read."""
+    """Raises CommandLineError for wrong arguments, before any file is read."""
     if args.full_value is not None and not 0.0 < args.full_value < 1e9:
         raise CommandLineError(f"--full-value: above 0 was expected, found {args.full_value:g}")
     if args.output.suffix.lower() not in OUTPUTS:

@@ -62,7 +62,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises what is wrong with the names of outputs before the voice is listened to."""
+    """Check the names of the outputs before the voice is analysed. Raises: CommandLineError."""
     require_suffix(args.out, _KINDS, "-o")
     require_writable(args.out, args.phonemes)
     if args.text is not None and Path(args.text).is_file():

@@ -29,7 +29,7 @@ def spelled(text: str) -> str:
 
 @contextlib.contextmanager
 def obeyed_by_nobody() -> Iterator[None]:
-    """What is printed until the context ends goes through `spelled`.
+    """Text that is printed until the context ends goes through `spelled`.
 
     Progress on the standard error begins with a carriage return, which stays there.
     """

@@ -51,7 +51,7 @@ def rescaled(clip: Clip, mapping: Mapping, full: float | None, angles: str | Non
 
 
 def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str | None) -> None:
-    """Say so where values lie far outside the range of what they move.
+    """Refuse values that lie far outside the range of their control.
 
     Args:
         clip: curves of controls and ANGLES.

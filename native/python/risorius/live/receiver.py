@@ -350,7 +350,7 @@ class Receiver:
         return subject if added else None
 
     def _free_label(self, packet: Packet, address: str) -> str:
-        """What a new subject is called: as it says itself, if no other is called so."""
+        """The label of a new subject: its own name, unless another subject has it."""
         name, taken = (
             packet.subject or packet.device or "unnamed",
             {s.label for s in self._subjects},

@@ -50,7 +50,7 @@ class _Place(Generic[Item]):
 
 
 class Roster(Generic[Key, Item]):
-    """What is kept of each sender, in the order in which they were first heard.
+    """The record of each sender, in the order of their first packets.
 
     Args:
         wanted: whether an item gets a place before all others and keeps it.

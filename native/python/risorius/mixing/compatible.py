@@ -43,7 +43,7 @@ _TOPOLOGY = (
     "layout_normals",
 )
 _VALUES = ("texture_coordinates", "normals")
-_OTHERS = {  # what is taken as it is, and so must be alike
+_OTHERS = {  # layers that a mix takes from the first face, so all faces must have the same
     "blend_shape_channels": "drivers of blend shapes",
     "rbf_behavior": "RBF solvers",
     "rbf_behavior_ext": "poses of RBF solvers",

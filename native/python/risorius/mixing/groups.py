@@ -55,7 +55,7 @@ def _lists(group: JointGroup) -> tuple[bytes, ...]:
 
 
 def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
-    """A group of those of the parents, which have the same rows and columns."""
+    """One group of the mix, from groups of the parents with the same rows and columns."""
     first = groups[0]
     rows = np.asarray(first.output_indices, np.int64)
     values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))

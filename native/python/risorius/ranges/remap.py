@@ -78,7 +78,7 @@ class Range(NamedTuple):
 
 
 class Learned(NamedTuple):
-    """What a take shows of one control."""
+    """Measurements of one control in a take."""
 
     range: Range
     """As found, also where it is left alone."""

@@ -141,7 +141,7 @@ def _runs(process: subprocess.Popen[bytes]) -> bool:
 
 
 def _largest_in(folder: Path) -> int:
-    """Size of the largest file below a folder: pip copies what it has, so a sum goes too far."""
+    """Size of the largest file below a folder; pip copies its download: a sum counts it twice."""
     largest = 0
     for path in folder.rglob("*"):
         with suppress(OSError):  # it has just been moved

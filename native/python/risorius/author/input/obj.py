@@ -114,7 +114,7 @@ def read_positions(path: Path, count: int) -> Doubles:
 
 
 def refuse_other_kinds(path: Path, expected: str, own: Container[str] = ()) -> None:
-    """Say what a file is that holds no mesh, where its bytes tell.
+    """Refuse a file of another kind by the name of its kind, where its bytes show it.
 
     Args:
         path: the file.

@@ -36,7 +36,7 @@ def need_plot() -> None:
 
 
 def report_page(source: risorius.Dna, rig: JointRig, data: bytes, name: str) -> bytes:
-    """What was made, drawn beside what it was made from.
+    """The result, drawn beside its source.
 
     Args:
         source: the face of shapes.

@@ -63,7 +63,7 @@ _LONGEST = 1e8  # seconds; what begins later is a date
 
 
 class TimeName(NamedTuple):
-    """What a header says of the times below it."""
+    """The unit that a header gives the times below it."""
 
     unit: str
     """One of UNITS, FRAMES, or "": it does not say."""
@@ -72,7 +72,7 @@ class TimeName(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What the caller says of a file's time; None: the file tells."""
+    """Options on the time of a file; None: as the file says."""
 
     rate: float | None = None
     """Frames a second."""
