@@ -32,7 +32,7 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
     """
     if not _follows(rig):
         return
-    wanted = np.array(seen.matrix_world)
+    wanted = np.array(seen.matrix_world, np.float64)  # float32 in Blender 5
     # Also what is only a rounding away is written: a frame shall not keep the one before it.
     if written.is_new(written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
         rig.matrix_basis = seen.matrix_world
