@@ -76,7 +76,7 @@ def test_hidden_outlines_leave_bones_and_sizes_as_they_were(rig):
     controls.pose.bones["neck"].custom_shape_scale_xyz = (3.0, 2.0, 1.0)
     before = {bone.name: bone.custom_shape_scale_xyz[:] for bone in controls.pose.bones}
     assert bpy.ops.risorius.hide_outlines() == {"FINISHED"}
-    bpy.ops.risorius.hide_outlines()  # twice: what was remembered is not lost
+    bpy.ops.risorius.hide_outlines()  # twice: the remembered state is not lost
     for bone in controls.pose.bones:
         assert not bone.bone.hide
         assert np.ptp(outline(controls, bone.name), axis=0).max() < 1e-6

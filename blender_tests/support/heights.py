@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How many lines a panel takes: what changes while one clicks must not move what is below."""
+"""The height of a panel in lines: a click must not move the lines below the pointer."""
 
 from types import SimpleNamespace
 

@@ -47,7 +47,7 @@ def _options(parser):
 
 
 def _named(path):
-    """Options in texts of a module, but in those that describe a command."""
+    """Options that the error sentences of a module name."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Raise):
             for text in ast.walk(node):

@@ -16,7 +16,7 @@ _COUNT = 32
 
 @dataclass(frozen=True)
 class Room:
-    """What a face takes at the height of its eyes, in the space of its control armature.
+    """Where a face lies at the height of its eyes, in the space of its control armature.
 
     Attributes:
         middle: x of its middle.

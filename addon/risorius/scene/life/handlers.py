@@ -153,7 +153,7 @@ def _imported(*_arguments: object) -> None:
 
 
 def _tidy_new() -> None:
-    """Outlines of faces that were appended leave the scene; what the user links later stays."""
+    """Outlines of appended faces leave the scene; objects that the user links later stay."""
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
     for uid in there.keys() - _state["faces"]:
         outlines.tidy(there[uid])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators on what the view shows: the face whole, its outlines."""
+"""Operators on the view: frame the face, hide its outlines."""
 
 import bpy
 

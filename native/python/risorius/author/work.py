@@ -22,8 +22,8 @@ MM = {"cm": 10.0, "m": 1000.0}
 # A vertex that follows another joint of the neck than before counts as one that is so far off: a
 # head that is turned moves them about so far against each other.
 CARRIED_MM = 20.0
-# What a face may take while it is made: a table of a whole face's expressions is some hundred times
-# the deltas that its file holds.
+# The most memory that making a rig may take: the dense table of all expressions is about a hundred
+# times as large as the deltas in the file.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 

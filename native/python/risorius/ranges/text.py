@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import Any
 
 from ..base import toml
+from ..base.reading import ReadingError
 from ..importing.errors import AnimationFileError
 from .remap import Learned, Range, Ranges
 
@@ -55,12 +55,13 @@ def load_ranges(path: str | os.PathLike[str]) -> Ranges:
     """
     name = os.fspath(path)
     try:
-        with Path(path).open("rb") as file:  # no more of it than is TOML that somebody wrote
-            text = file.read(4 * toml.MOST_BYTES + 1).decode("utf-8-sig")
+        text = toml.text_of(path)
+    except ReadingError as error:
+        raise AnimationFileError(name, error.what) from error
     except OSError as error:
         raise AnimationFileError(name, f"cannot read it: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise AnimationFileError(name, f"UTF-8 text was expected (byte {error.start})") from error
+    except toml.TomlError as error:
+        raise AnimationFileError(name, str(error)) from error
     return parse_ranges(text, name)
 
 
