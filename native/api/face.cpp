@@ -120,7 +120,7 @@ void drop_behavior(dna::Dna& dna) {
   dna.twist_swing_behavior = {};
 }
 
-Result<Face> make_face(core::Source& source, const risorius_options& options) {
+Result<Face> make_face(bytes::Source& source, const risorius_options& options) {
   Result<dna::Dna> dna = dna::parse(source, parse_options(options));
   if (!dna) return std::move(dna).propagate();
   RISORIUS_TRY(has_all_lods(options, *dna));
@@ -134,7 +134,7 @@ Result<Face> make_face(core::Source& source, const risorius_options& options) {
   return face;
 }
 
-risorius_status open(core::Source& source, const char* path, const risorius_options& options,
+risorius_status open(bytes::Source& source, const char* path, const risorius_options& options,
                      risorius_face** face) {
   Result<Face> made = make_face(source, options);
   if (!made) return remember(made.error(), path);
@@ -164,7 +164,7 @@ risorius_status risorius_open_file(const char* path, const risorius_options* opt
       return api::remember(checked.error(), path);
     }
     const std::string bytes(path);
-    auto source = core::open_file(std::u8string(bytes.begin(), bytes.end()));
+    auto source = bytes::open_file(std::u8string(bytes.begin(), bytes.end()));
     if (!source) return api::remember(source.error(), path);
     return api::open(**source, path, wanted, face);
   });
@@ -179,7 +179,7 @@ risorius_status risorius_open_memory(const void* bytes, size_t size,
     if (const core::Status checked = api::check(wanted); !checked) {
       return api::remember(checked.error());
     }
-    core::SpanSource source({static_cast<const std::uint8_t*>(bytes), size});
+    bytes::SpanSource source({static_cast<const std::uint8_t*>(bytes), size});
     return api::open(source, "", wanted, face);
   });
 }

@@ -73,7 +73,7 @@ void write_clip(const std::filesystem::path& path, const py::bytes& bytes) {
   const auto view = static_cast<std::string_view>(bytes);
   auto written = [&] {
     const py::gil_scoped_release release;
-    return core::write_file_atomically(
+    return bytes::write_file_atomically(
         path, {reinterpret_cast<const std::uint8_t*>(view.data()), view.size()});
   }();
   taken(std::move(written));
@@ -83,16 +83,16 @@ void write_clip(const std::filesystem::path& path, const py::bytes& bytes) {
 class ClipFile {
  public:
   ClipFile(const py::object& source, bool recover) {
-    std::unique_ptr<core::Source> from;
+    std::unique_ptr<bytes::Source> from;
     if (py::isinstance<py::bytes>(source)) {
       bytes_ = source;
       const auto view = static_cast<std::string_view>(bytes_);
-      from = std::make_unique<core::SpanSource>(
+      from = std::make_unique<bytes::SpanSource>(
           clip::View(reinterpret_cast<const std::uint8_t*>(view.data()), view.size()));
     } else {
       const auto path = source.cast<std::filesystem::path>();
-      name_ = core::utf8(path);
-      from = taken(core::open_file(path));
+      name_ = bytes::utf8(path);
+      from = taken(bytes::open_file(path));
     }
     auto opened = [&] {
       const py::gil_scoped_release release;

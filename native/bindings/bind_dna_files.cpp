@@ -31,9 +31,9 @@ py::bytes to_bytes(const Bytes& bytes) {
   return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
-core::SpanSource source_of(const py::bytes& bytes) {
+bytes::SpanSource source_of(const py::bytes& bytes) {
   const std::string_view view = bytes;
-  return core::SpanSource({reinterpret_cast<const std::uint8_t*>(view.data()), view.size()});
+  return bytes::SpanSource({reinterpret_cast<const std::uint8_t*>(view.data()), view.size()});
 }
 
 std::uint16_t minor_version(const std::string& version) {
@@ -110,7 +110,7 @@ void bind_writing(DnaClass& c) {
       [](const Dna& s, const std::filesystem::path& path, const std::string& version,
          const std::string& unknown_layers) {
         const Bytes bytes = serialise(s, version, unknown_layers);
-        unwrap(unlocked([&] { return core::write_file_atomically(path, bytes); }));
+        unwrap(unlocked([&] { return bytes::write_file_atomically(path, bytes); }));
       },
       py::arg("path"), py::arg("version") = "2.8", py::arg("unknown_layers") = "preserve",
       "Writes the file; the old one is whole until the new one is.");
@@ -277,13 +277,13 @@ void bind_changes(DnaClass& c) {
   });
 }
 
-std::shared_ptr<Dna> parse(core::Source& source, const dna::ParseOptions& options,
+std::shared_ptr<Dna> parse(bytes::Source& source, const dna::ParseOptions& options,
                            const std::string& file) {
   return std::make_shared<Dna>(unwrap(unlocked([&] { return dna::parse(source, options); }), file));
 }
 
 // (is_error, code, where, offset or None, message)
-py::list findings(core::Source& source, const dna::Limits& limits) {
+py::list findings(bytes::Source& source, const dna::Limits& limits) {
   py::list out;
   for (const dna::Finding& f : unlocked([&] { return dna::check(source, limits); })) {
     const core::Error& e = f.error;
@@ -334,19 +334,19 @@ void bind_dna_files(py::module_& m, DnaClass& c) {
   bind_layers(c);
   bind_changes(c);
   m.def("parse_bytes", [](const py::bytes& bytes, const dna::ParseOptions& options) {
-    core::SpanSource source = source_of(bytes);
+    bytes::SpanSource source = source_of(bytes);
     return parse(source, options, "");
   });
   m.def("parse_file", [](const std::filesystem::path& path, const dna::ParseOptions& options) {
-    std::unique_ptr<core::Source> source = unwrap(core::open_file(path));
-    return parse(*source, options, core::utf8(path));
+    std::unique_ptr<bytes::Source> source = unwrap(bytes::open_file(path));
+    return parse(*source, options, bytes::utf8(path));
   });
   m.def("check_bytes", [](const py::bytes& bytes, const dna::Limits& limits) {
-    core::SpanSource source = source_of(bytes);
+    bytes::SpanSource source = source_of(bytes);
     return findings(source, limits);
   });
   m.def("check_file", [](const std::filesystem::path& path, const dna::Limits& limits) {
-    std::unique_ptr<core::Source> source = unwrap(core::open_file(path));
+    std::unique_ptr<bytes::Source> source = unwrap(bytes::open_file(path));
     return findings(*source, limits);
   });
 }

@@ -12,7 +12,7 @@ namespace {
   // OSError makes the class that is the number's own of these, e.g. PermissionError.
   const py::tuple about =
       py::make_tuple(reason.default_error_condition().value(),
-                     to_python(core::write_trouble(reason)), py::str(py::cast(path)));
+                     to_python(bytes::write_trouble(reason)), py::str(py::cast(path)));
   PyErr_SetObject(PyExc_OSError, about.ptr());
   throw py::error_already_set();
 }
@@ -24,9 +24,9 @@ class FileReplacement {
     std::error_code reason;
     {
       const py::gil_scoped_release release;
-      target_ = core::linked_file(path);
-      if (sweep) core::remove_leftovers(target_.parent_path());
-      file_ = core::NewFile::beside(target_, reason);
+      target_ = bytes::linked_file(path);
+      if (sweep) bytes::remove_leftovers(target_.parent_path());
+      file_ = bytes::NewFile::beside(target_, reason);
     }
     if (!file_) throw_os_error(path_, reason);
     temporary_ = file_->path();
@@ -49,7 +49,7 @@ class FileReplacement {
 
  private:
   std::filesystem::path path_, target_, temporary_;
-  std::optional<core::NewFile> file_;
+  std::optional<bytes::NewFile> file_;
 };
 
 }  // namespace
@@ -69,9 +69,9 @@ void bind_files(py::module_& m) {
         std::filesystem::path folder;
         {
           const py::gil_scoped_release release;
-          const std::filesystem::path target = core::linked_file(path);
-          core::remove_leftovers(target.parent_path());
-          folder = core::make_hidden_folder(target, reason);
+          const std::filesystem::path target = bytes::linked_file(path);
+          bytes::remove_leftovers(target.parent_path());
+          folder = bytes::make_hidden_folder(target, reason);
         }
         if (reason) throw_os_error(path, reason);
         return folder;
@@ -85,8 +85,8 @@ void bind_files(py::module_& m) {
         std::error_code reason;
         {
           const py::gil_scoped_release release;
-          auto made = core::NewFile::adopt(file, reason);
-          if (made) reason = made->take_place_of(core::linked_file(path));
+          auto made = bytes::NewFile::adopt(file, reason);
+          if (made) reason = made->take_place_of(bytes::linked_file(path));
         }
         if (reason) throw_os_error(path, reason);
       },
@@ -97,7 +97,7 @@ void bind_files(py::module_& m) {
       "remove_leftovers",
       [](const std::filesystem::path& folder) {
         const py::gil_scoped_release release;
-        core::remove_leftovers(folder);
+        bytes::remove_leftovers(folder);
       },
       py::arg("folder"),
       "Removes what processes of this machine that have ended left of files that they wrote.");

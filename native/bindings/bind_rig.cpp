@@ -266,7 +266,7 @@ std::shared_ptr<rig::Rig> load_rig(const std::filesystem::path& path, std::optio
   if (trusted) trust = *trusted ? rig::Trust::kCaller : rig::Trust::kNobody;
   const auto open = [&] {
     const py::gil_scoped_release released;
-    return rig::open_rig_file(path, trust, mapped ? core::ReadBy::kMap : core::ReadBy::kCopy,
+    return rig::open_rig_file(path, trust, mapped ? bytes::ReadBy::kMap : bytes::ReadBy::kCopy,
                               kernels);
   };
   return std::make_shared<rig::Rig>(unwrap(open()));

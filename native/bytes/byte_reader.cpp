@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 namespace {
 
@@ -34,9 +34,9 @@ std::string ByteReader::where() const {
   return text;
 }
 
-void ByteReader::fail_at(std::uint64_t offset, ErrorCode code, std::string message) {
+void ByteReader::fail_at(std::uint64_t offset, core::ErrorCode code, std::string message) {
   if (error_) return;
-  error_ = Error{code, offset, where(), std::move(message)};
+  error_ = core::Error{code, offset, where(), std::move(message)};
   bound();
 }
 
@@ -65,7 +65,7 @@ void ByteReader::move_to(std::uint64_t offset) {
 bool ByteReader::enter(std::uint64_t offset, std::uint64_t size) {
   if (failed()) return false;
   if (offset > source_->size() || size > source_->size() - offset) {
-    fail_at(std::min(offset, source_->size()), ErrorCode::kTruncated,
+    fail_at(std::min(offset, source_->size()), core::ErrorCode::kTruncated,
             "the file ends at byte " + std::to_string(source_->size()) + ", but " +
                 std::to_string(size) + " bytes were announced from byte " + std::to_string(offset));
     return false;
@@ -79,7 +79,7 @@ bool ByteReader::enter(std::uint64_t offset, std::uint64_t size) {
 bool ByteReader::check_left(std::uint64_t bytes) {
   if (failed()) return false;
   if (bytes <= left()) return true;
-  fail_at(position(), ErrorCode::kTruncated,
+  fail_at(position(), core::ErrorCode::kTruncated,
           std::to_string(bytes) + " more bytes were expected, only " + std::to_string(left()) +
               " are left");
   return false;
@@ -104,7 +104,7 @@ bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
   loaded_ = first_ + rest + got;
   bound();
   if (rest + got >= n) return true;
-  fail_at(begin, ErrorCode::kIoRead, "the file became shorter while it was read");
+  fail_at(begin, core::ErrorCode::kIoRead, "the file became shorter while it was read");
   return false;
 }
 
@@ -134,14 +134,14 @@ std::uint32_t ByteReader::count_slowly(std::uint32_t element_size) {
   const std::uint32_t n = u32();
   if (failed()) return 0;
   if (std::uint64_t{n} * element_size > left()) {
-    fail_at(at, ErrorCode::kInvalidCount,
+    fail_at(at, core::ErrorCode::kInvalidCount,
             "a count of " + std::to_string(n) + " needs at least " +
                 std::to_string(std::uint64_t{n} * element_size) + " bytes, only " +
                 std::to_string(left()) + " are left");
     return 0;
   }
   if (n > max_count_) {
-    fail_at(at, ErrorCode::kLimitExceeded,
+    fail_at(at, core::ErrorCode::kLimitExceeded,
             "a count of " + std::to_string(n) + ", the limit is " + std::to_string(max_count_));
     return 0;
   }
@@ -168,7 +168,7 @@ std::string ByteReader::str() {
 
 std::vector<std::uint8_t> ByteReader::bytes(std::uint64_t size) {
   if (size > left()) {
-    fail_at(position(), ErrorCode::kTruncated,
+    fail_at(position(), core::ErrorCode::kTruncated,
             std::to_string(size) + " bytes were expected, only " + std::to_string(left()) +
                 " are left");
     return {};
@@ -185,7 +185,7 @@ std::vector<std::uint8_t> ByteReader::bytes(std::uint64_t size) {
 void ByteReader::skip(std::uint64_t size) {
   if (failed()) return;
   if (size > left()) {
-    fail_at(position(), ErrorCode::kTruncated, "a part that is skipped ends beyond the file");
+    fail_at(position(), core::ErrorCode::kTruncated, "a part that is skipped ends beyond the file");
     return;
   }
   move_to(position() + size);
@@ -215,23 +215,23 @@ void ByteReader::read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* larg
   if (largest != nullptr) *largest = std::max(*largest, top);
 }
 
-Array<float> ByteReader::f32_list(bool* all_finite) {
-  Buffer<float> values(count(4));
+core::Array<float> ByteReader::f32_list(bool* all_finite) {
+  core::Buffer<float> values(count(4));
   read_f32(values.data(), values.size(), all_finite);
   if (failed()) return {};
   return values;
 }
-Array<std::uint16_t> ByteReader::u16_list() {
-  Buffer<std::uint16_t> values(count(2));
+core::Array<std::uint16_t> ByteReader::u16_list() {
+  core::Buffer<std::uint16_t> values(count(2));
   read_u16(values.data(), values.size());
   if (failed()) return {};
   return values;
 }
-Array<std::uint32_t> ByteReader::u32_list(std::uint32_t* largest) {
-  Buffer<std::uint32_t> values(count(4));
+core::Array<std::uint32_t> ByteReader::u32_list(std::uint32_t* largest) {
+  core::Buffer<std::uint32_t> values(count(4));
   read_u32(values.data(), values.size(), largest);
   if (failed()) return {};
   return values;
 }
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -15,7 +15,7 @@
 #include "core/buffer.h"
 #include "simd/kernels.h"
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 /// Reads numbers one after the other. After the first failure every read gives zero or an empty
 /// list and error() stays as it was: a parser checks once per struct, not once per number.
@@ -39,15 +39,15 @@ class ByteReader {
   std::uint64_t end() const { return end_; }
   std::uint64_t left() const { return end_ > position() ? end_ - position() : 0; }
   bool failed() const { return error_.has_value(); }
-  const Error& error() const { return *error_; }
-  Unexpected take_error() { return Unexpected{*error_}; }
+  const core::Error& error() const { return *error_; }
+  core::Unexpected take_error() { return core::Unexpected{*error_}; }
   /// After this, enter() reads on somewhere else.
   void clear_error();
   /// No list may have more elements, whatever the bytes would allow.
   void set_max_count(std::uint32_t n) { max_count_ = n; }
   /// Remembers an error, unless there is one already.
   /// In: offset  the byte of the file that is wrong; the field is what where() says now
-  void fail_at(std::uint64_t offset, ErrorCode code, std::string message);
+  void fail_at(std::uint64_t offset, core::ErrorCode code, std::string message);
 
   /// Restricts reading to [offset, offset + size). Out: whether that lies inside the source; if not
   /// the reader has failed.
@@ -78,11 +78,11 @@ class ByteReader {
   void skip(std::uint64_t size);
   /// A count, then so many numbers.
   /// Out: all_finite   becomes false when a value is infinite or no number; is never made true
-  Array<float> f32_list(bool* all_finite = nullptr);
-  Array<std::uint16_t> u16_list();
+  core::Array<float> f32_list(bool* all_finite = nullptr);
+  core::Array<std::uint16_t> u16_list();
   /// A count, then so many numbers.
   /// Out: largest      grows to the largest value
-  Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
+  core::Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
   /// Reads n values without a count, straight into out. In: n already checked by count(). What is
   /// in out after a failure is not defined.
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
@@ -135,10 +135,10 @@ class ByteReader {
   const std::uint8_t* at_ = nullptr;
   const std::uint8_t* ready_ = nullptr;
   const std::uint8_t* loaded_ = nullptr;
-  Buffer<std::uint8_t> window_;
+  core::Buffer<std::uint8_t> window_;
   std::size_t next_read_ = 0;
   std::vector<PathPart> path_;
-  std::optional<Error> error_;
+  std::optional<core::Error> error_;
 };
 
 /// Names the field while it is in scope: Field f(reader, "joint_groups", i);
@@ -155,4 +155,4 @@ class Field {
   ByteReader& reader_;
 };
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

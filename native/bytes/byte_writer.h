@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 /// Appends numbers to a growing list of bytes. Nothing can fail but the memory.
 class ByteWriter {
@@ -61,4 +61,4 @@ class ByteWriter {
   std::vector<std::uint8_t> bytes_;
 };
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

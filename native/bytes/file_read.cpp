@@ -17,25 +17,25 @@
 #include <unistd.h>
 #endif
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 namespace {
 
 using std::filesystem::path;
 
-Unexpected cut_short(const path& file) {
-  return fail(ErrorCode::kIoRead, "", utf8(file) + " was cut while it was read");
+core::Unexpected cut_short(const path& file) {
+  return core::fail(core::ErrorCode::kIoRead, "", utf8(file) + " was cut while it was read");
 }
 
 }  // namespace
 
 #ifdef _WIN32
 
-Result<FileBytes> read_file(const path& file, ReadBy) {
+core::Result<FileBytes> read_file(const path& file, ReadBy) {
   auto source = open_file(file);
   if (!source) return std::move(source).propagate();
   const auto size = static_cast<std::size_t>((*source)->size());
-  const std::shared_ptr<std::uint8_t> bytes = allocate_pages(size, Fill::kNothing);
+  const std::shared_ptr<std::uint8_t> bytes = core::allocate_pages(size, core::Fill::kNothing);
   if ((*source)->read(0, {bytes.get(), size}) != size) return cut_short(file);
   return FileBytes{{bytes.get(), size}, bytes, false};
 }
@@ -44,10 +44,10 @@ Result<FileBytes> read_file(const path& file, ReadBy) {
 
 namespace {
 
-Unexpected failure(ErrorCode code, const char* verb, const path& file, int reason) {
-  return fail(code, "",
-              std::string("cannot ") + verb + " " + utf8(file) + ": " +
-                  std::generic_category().message(reason));
+core::Unexpected failure(core::ErrorCode code, const char* verb, const path& file, int reason) {
+  return core::fail(code, "",
+                    std::string("cannot ") + verb + " " + utf8(file) + ": " +
+                        std::generic_category().message(reason));
 }
 
 class Descriptor {
@@ -73,18 +73,18 @@ std::shared_ptr<const void> mapped(int file, std::size_t size) {
 
 }  // namespace
 
-Result<FileBytes> read_file(const path& name, ReadBy by) {
+core::Result<FileBytes> read_file(const path& name, ReadBy by) {
   // A pipe without a writer would wait for one.
   const Descriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (file.number() < 0) return failure(ErrorCode::kIoOpen, "open", name, errno);
+  if (file.number() < 0) return failure(core::ErrorCode::kIoOpen, "open", name, errno);
   struct stat about = {};
   if (::fstat(file.number(), &about) != 0) {
-    return failure(ErrorCode::kIoRead, "read the size of", name, errno);
+    return failure(core::ErrorCode::kIoRead, "read the size of", name, errno);
   }
   if (!S_ISREG(about.st_mode)) {
-    return fail(ErrorCode::kIoOpen, "",
-                utf8(name) + (S_ISDIR(about.st_mode) ? " is a folder" : " is no plain file") +
-                    ", a file was expected");
+    return core::fail(core::ErrorCode::kIoOpen, "",
+                      utf8(name) + (S_ISDIR(about.st_mode) ? " is a folder" : " is no plain file") +
+                          ", a file was expected");
   }
   const auto size = static_cast<std::size_t>(about.st_size);
   const bool own = about.st_uid == ::geteuid() && (about.st_mode & (S_IWGRP | S_IWOTH)) == 0;
@@ -93,14 +93,14 @@ Result<FileBytes> read_file(const path& name, ReadBy by) {
       return FileBytes{{static_cast<const std::uint8_t*>(map.get()), size}, map, own};
     }
   }
-  const std::shared_ptr<std::uint8_t> bytes = allocate_pages(size, Fill::kNothing);
+  const std::shared_ptr<std::uint8_t> bytes = core::allocate_pages(size, core::Fill::kNothing);
   errno = 0;
   if (detail::read_at(file.number(), 0, {bytes.get(), size}) != size) {
-    return errno == 0 ? cut_short(name) : failure(ErrorCode::kIoRead, "read", name, errno);
+    return errno == 0 ? cut_short(name) : failure(core::ErrorCode::kIoRead, "read", name, errno);
   }
   return FileBytes{{bytes.get(), size}, bytes, own};
 }
 
 #endif
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -9,7 +9,7 @@
 
 #include "core/result.h"
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 struct FileBytes {
   std::span<const std::uint8_t> bytes;  // on a multiple of 64
@@ -29,6 +29,6 @@ enum class ReadBy {
 
 /// Fails: kIoOpen, kIoRead (the system's reason; what is no plain file; a file that is cut while it
 ///        is read)
-Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
+core::Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

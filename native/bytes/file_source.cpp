@@ -19,7 +19,7 @@
 #include <unistd.h>
 #endif
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 namespace {
 
@@ -88,23 +88,24 @@ class FileSource final : public Source {
 
 }  // namespace
 
-Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path) {
+core::Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path) {
   const std::string name = utf8(path);
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {
-    return fail(ErrorCode::kIoOpen, "", name + " is a folder, a file was expected");
+    return core::fail(core::ErrorCode::kIoOpen, "", name + " is a folder, a file was expected");
   }
   const Handle file = open_for_reading(path);
   if (!is_open(file)) {
-    return fail(ErrorCode::kIoOpen, "",
-                "cannot open " + name + ": " + std::generic_category().message(errno));
+    return core::fail(core::ErrorCode::kIoOpen, "",
+                      "cannot open " + name + ": " + std::generic_category().message(errno));
   }
   const std::uint64_t size = std::filesystem::file_size(path, error);
   if (error) {
     close_handle(file);
-    return fail(ErrorCode::kIoRead, "", "cannot read the size of " + name + ": " + error.message());
+    return core::fail(core::ErrorCode::kIoRead, "",
+                      "cannot read the size of " + name + ": " + error.message());
   }
   return std::unique_ptr<Source>(std::make_unique<FileSource>(file, size));
 }
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -30,7 +30,7 @@
 #include <unistd.h>
 #endif
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 namespace {
 
@@ -209,12 +209,12 @@ std::optional<long long> maker_of(std::string_view name, std::string_view begin)
   return process;
 }
 
-Unexpected failure(const fs::path& path, const std::error_code& reason) {
+core::Unexpected failure(const fs::path& path, const std::error_code& reason) {
   std::error_code error;
   const bool is_there = fs::is_regular_file(path, error);
-  return fail(ErrorCode::kIoWrite, "",
-              "cannot write " + utf8(path) + ": " + write_trouble(reason) +
-                  (is_there ? "; the file of that name from before is unchanged" : ""));
+  return core::fail(core::ErrorCode::kIoWrite, "",
+                    "cannot write " + utf8(path) + ": " + write_trouble(reason) +
+                        (is_there ? "; the file of that name from before is unchanged" : ""));
 }
 
 }  // namespace
@@ -375,8 +375,8 @@ fs::path make_hidden_folder(const fs::path& target, std::error_code& error) {
   return error ? fs::path() : folder;
 }
 
-Status write_file_atomically(const fs::path& path, std::span<const std::uint8_t> bytes,
-                             const FileCalls& calls) {
+core::Status write_file_atomically(const fs::path& path, std::span<const std::uint8_t> bytes,
+                                   const FileCalls& calls) {
   const fs::path target = linked_file(path);
   remove_leftovers(target.parent_path());
   std::error_code reason;
@@ -384,7 +384,7 @@ Status write_file_atomically(const fs::path& path, std::span<const std::uint8_t>
   if (file) reason = file->write(bytes);
   if (!reason) reason = file->take_place_of(target);
   if (reason) return failure(path, reason);
-  return ok();
+  return core::ok();
 }
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

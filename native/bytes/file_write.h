@@ -12,7 +12,7 @@
 
 #include "core/result.h"
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 /// What writing a file asks of the system. Tests put failing calls in their place: a power cut and
 /// most kinds of full disks cannot be had otherwise. All but create return 0 or more for success,
@@ -94,7 +94,8 @@ std::string write_trouble(const std::error_code& reason);
 /// Writes bytes to a new file beside path, brings it to the disk and puts it in path's place; a
 /// link stays one. Removes what dead writers left in the folder.
 /// Fails: kIoWrite with the system's reason; an old file is untouched and nothing is left behind.
-Status write_file_atomically(const std::filesystem::path& path, std::span<const std::uint8_t> bytes,
-                             const FileCalls& calls = system_file_calls());
+core::Status write_file_atomically(const std::filesystem::path& path,
+                                   std::span<const std::uint8_t> bytes,
+                                   const FileCalls& calls = system_file_calls());
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

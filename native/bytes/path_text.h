@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 /// A path for people to read, in UTF-8. path::string() throws on Windows where the system's code
 /// page lacks a character.
@@ -13,4 +13,4 @@ inline std::string utf8(const std::filesystem::path& path) {
   return {text.begin(), text.end()};
 }
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 
-namespace risorius::core::detail {
+namespace risorius::bytes::detail {
 
 // One call of the system per read: no position to move first. It may give less than there is.
 std::size_t read_at(int file, std::uint64_t offset, std::span<std::uint8_t> out) {
@@ -24,6 +24,6 @@ std::size_t read_at(int file, std::uint64_t offset, std::span<std::uint8_t> out)
   return done;
 }
 
-}  // namespace risorius::core::detail
+}  // namespace risorius::bytes::detail
 
 #endif

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 std::size_t SpanSource::read(std::uint64_t offset, std::span<std::uint8_t> out) {
   if (offset >= bytes_.size()) return 0;
@@ -13,4 +13,4 @@ std::size_t SpanSource::read(std::uint64_t offset, std::span<std::uint8_t> out) 
   return n;
 }
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

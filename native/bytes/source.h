@@ -9,7 +9,7 @@
 
 #include "core/result.h"
 
-namespace risorius::core {
+namespace risorius::bytes {
 
 class Source {
  public:
@@ -35,6 +35,6 @@ class SpanSource final : public Source {
 
 /// Opens a file for reading. No memory map: a file that is cut short meanwhile gives an error and
 /// not a signal. Fails: kIoOpen with the system's reason.
-Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path);
+core::Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path);
 
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -8,17 +8,17 @@
 namespace risorius::rig {
 
 core::Status save_rig(const Rig& rig, const std::filesystem::path& path) {
-  return core::write_file_atomically(path, rig.block());
+  return bytes::write_file_atomically(path, rig.block());
 }
 
-core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, core::ReadBy by,
+core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, bytes::ReadBy by,
                                 const simd::Kernels& kernels) {
-  if (trust == Trust::kNobody) by = core::ReadBy::kCopy;
-  auto file = core::read_file(path, by);
+  if (trust == Trust::kNobody) by = bytes::ReadBy::kCopy;
+  auto file = bytes::read_file(path, by);
   const auto trusted = [&] {
     return trust == Trust::kCaller || (trust == Trust::kOwner && file->is_own);
   };
-  if (file && by == core::ReadBy::kMap && !trusted()) file = core::read_file(path);
+  if (file && by == bytes::ReadBy::kMap && !trusted()) file = bytes::read_file(path);
   if (!file) return std::move(file).propagate();
   // A disk may have changed a bit of any file: only the caller's word spares the hash.
   const BlockCheck own = trust == Trust::kCaller ? BlockCheck::kHeader : BlockCheck::kHash;
@@ -26,7 +26,7 @@ core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, 
   auto rig = open_rig(file->bytes, file->owner, check, kernels);
   if (rig) return rig;
   core::Error error = rig.error();
-  error.message = core::utf8(path) + ": " + error.message;
+  error.message = bytes::utf8(path) + ": " + error.message;
   return core::Unexpected{std::move(error)};
 }
 

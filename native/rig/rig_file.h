@@ -29,7 +29,7 @@ core::Status save_rig(const Rig& rig, const std::filesystem::path& path);
 /// In:    by  kMap opens a large file at once where its bytes are trusted; others are copied,
 ///            since whoever can write to a mapped file can change it after the check
 /// Fails: kIoOpen, kIoRead, and as open_rig
-core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, core::ReadBy by,
+core::Result<Rig> open_rig_file(const std::filesystem::path& path, Trust trust, bytes::ReadBy by,
                                 const simd::Kernels& kernels);
 
 }  // namespace risorius::rig

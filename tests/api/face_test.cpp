@@ -16,7 +16,7 @@ using namespace testing_support;
 dna::Dna read_golden(const std::string& name, std::vector<std::uint16_t> lods = {}) {
   dna::ParseOptions options;
   options.lods.lods = std::move(lods);
-  auto source = core::open_file(golden_path(name));
+  auto source = bytes::open_file(golden_path(name));
   auto dna = dna::parse(*source.value(), options);
   EXPECT_TRUE(dna.has_value());
   return std::move(dna).value();

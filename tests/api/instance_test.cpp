@@ -22,7 +22,7 @@ using namespace testing_support;
 const char* const kGolden[] = {"core", "medium", "ml", "mlquat", "rbf", "quatjoints", "twistswing"};
 
 rig::Rig compile_golden(const std::string& name, const compile::CompileOptions& options = {}) {
-  auto source = core::open_file(golden_path(name));
+  auto source = bytes::open_file(golden_path(name));
   const auto dna = dna::parse(*source.value());
   auto rig = compile::compile(dna.value(), options);
   EXPECT_TRUE(rig.has_value());

@@ -17,7 +17,7 @@ namespace {
 
 using namespace risorius;
 
-void add(const char* name, const std::filesystem::path& file, rig::Trust trust, core::ReadBy by,
+void add(const char* name, const std::filesystem::path& file, rig::Trust trust, bytes::ReadBy by,
          bool evaluates = false) {
   benchmark::RegisterBenchmark(name, [=](benchmark::State& state) {
     for (auto _ : state) {
@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
   }
   const std::filesystem::path dna_file = argv[1];
   const auto compiled = [&] {
-    auto source = core::open_file(dna_file);
+    auto source = bytes::open_file(dna_file);
     if (!source) return core::Result<rig::Rig>(std::move(source).propagate());
     const auto dna = dna::parse(**source);
     return dna ? compile::compile(*dna, {}) : core::Result<rig::Rig>(core::Unexpected{dna.error()});
@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
   benchmark::RegisterBenchmark("read the DNA and compile", [&](benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(compiled());
   })->Unit(benchmark::kMicrosecond);
-  using core::ReadBy;
+  using bytes::ReadBy;
   add("header checked, mapped", file, rig::Trust::kCaller, ReadBy::kMap);
   add("header checked, copied", file, rig::Trust::kCaller, ReadBy::kCopy);
   add("hash checked, mapped", file, rig::Trust::kOwner, ReadBy::kMap);

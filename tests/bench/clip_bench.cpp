@@ -37,7 +37,7 @@ struct File {
 };
 
 clip::Reader open(const File& file) {
-  return *clip::Reader::open(std::make_unique<core::SpanSource>(file.bytes));
+  return *clip::Reader::open(std::make_unique<bytes::SpanSource>(file.bytes));
 }
 
 void set_rate(benchmark::State& state, const File& file) {
@@ -91,7 +91,7 @@ void play_decoded(benchmark::State& state, const File& file) {
 }
 
 void evaluate(benchmark::State& state, const std::string& path) {
-  auto source = core::open_file(path);
+  auto source = bytes::open_file(path);
   if (!source) return state.SkipWithError(source.error().describe().c_str());
   const auto dna = dna::parse(**source, {});
   if (!dna) return state.SkipWithError(dna.error().describe().c_str());

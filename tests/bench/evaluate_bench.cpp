@@ -74,7 +74,7 @@ void evaluate_shapes(benchmark::State& state) {
 }
 
 std::unique_ptr<rig::Rig> load(const char* path, const simd::Kernels* kernels) {
-  auto source = core::open_file(path);
+  auto source = bytes::open_file(path);
   if (!source) return nullptr;
   const auto dna = dna::parse(**source);
   if (!dna) return nullptr;

@@ -28,9 +28,9 @@ namespace {
 using namespace risorius;
 using Clock = std::chrono::steady_clock;
 
-class CountingSource final : public core::Source {
+class CountingSource final : public bytes::Source {
  public:
-  explicit CountingSource(core::Source& source) : source_(source) {}
+  explicit CountingSource(bytes::Source& source) : source_(source) {}
   std::uint64_t size() const override { return source_.size(); }
   std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override {
     const std::size_t n = source_.read(offset, out);
@@ -40,7 +40,7 @@ class CountingSource final : public core::Source {
   std::uint64_t bytes() const { return bytes_; }
 
  private:
-  core::Source& source_;
+  bytes::Source& source_;
   std::uint64_t bytes_ = 0;
 };
 
@@ -62,7 +62,7 @@ T must(core::Result<T> result) {
   return std::move(result).value();
 }
 
-std::unique_ptr<core::Source> open(const char* path) { return must(core::open_file(path)); }
+std::unique_ptr<bytes::Source> open(const char* path) { return must(bytes::open_file(path)); }
 
 void return_memory() {
 #ifdef __GLIBC__
@@ -84,14 +84,14 @@ struct Free {
 };
 using Bytes = std::unique_ptr<std::uint8_t, Free>;
 
-Bytes read_plainly(core::Source& source) {
+Bytes read_plainly(bytes::Source& source) {
   const auto size = static_cast<std::size_t>(source.size());
   Bytes bytes(static_cast<std::uint8_t*>(std::malloc(size + 1)));
   if (bytes == nullptr || source.read(0, {bytes.get(), size}) != size) std::exit(1);
   return bytes;
 }
 
-Bytes read_and_swap(core::Source& source) {
+Bytes read_and_swap(bytes::Source& source) {
   Bytes bytes = read_plainly(source);
   const auto words = static_cast<std::size_t>(source.size()) / 4;
   for (std::size_t i = 0; i < words; ++i) {
@@ -151,7 +151,7 @@ class Bench {
     bytes_ = read_plainly(*file);
     const std::span<const std::uint8_t> all(bytes_.get(), static_cast<std::size_t>(file->size()));
     const auto load = [all] {
-      core::SpanSource source(all);
+      bytes::SpanSource source(all);
       return must(dna::parse(source));
     };
     count(row, {}, load);

@@ -418,7 +418,7 @@ class Reporter : public benchmark::ConsoleReporter {
 };
 
 core::Result<dna::Dna> read(const char* path) {
-  auto source = core::open_file(path);
+  auto source = bytes::open_file(path);
   if (!source) return core::Unexpected{source.error()};
   return dna::parse(**source);
 }

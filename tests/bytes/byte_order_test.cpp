@@ -8,7 +8,7 @@
 
 #include "bytes/byte_reader.h"
 
-namespace risorius::core {
+namespace risorius::bytes {
 namespace {
 
 constexpr std::array<std::uint8_t, 12> kBytes{0, 0, 0, 2, 0x40, 0, 0, 0, 0xC0, 0x40, 0, 0};
@@ -27,7 +27,7 @@ TEST(ByteOrder, IsThatOfTheTable) {
   ByteReader reader(source, table);
   bool finite = true;
   calls = 0;
-  const Array<float> values = reader.f32_list(&finite);
+  const core::Array<float> values = reader.f32_list(&finite);
   EXPECT_EQ(calls, 1);
   ASSERT_EQ(values.size(), 2u);
   EXPECT_EQ(values[1], std::numeric_limits<float>::infinity());
@@ -41,10 +41,10 @@ TEST(ByteOrder, IsThatOfTheEnvironment) {
   ByteReader reader(source);
   EXPECT_STREQ(reader.simd(), forced);
   bool finite = true;
-  const Array<float> values = reader.f32_list(&finite);
-  EXPECT_EQ(values, (Array<float>{2.0f, -3.0f}));
+  const core::Array<float> values = reader.f32_list(&finite);
+  EXPECT_EQ(values, (core::Array<float>{2.0f, -3.0f}));
   EXPECT_TRUE(finite);
 }
 
 }  // namespace
-}  // namespace risorius::core
+}  // namespace risorius::bytes

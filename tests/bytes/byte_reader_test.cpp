@@ -13,7 +13,7 @@
 
 #include "bytes/byte_writer.h"
 
-namespace risorius::core {
+namespace risorius::bytes {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -75,11 +75,11 @@ TEST_P(ByteReaderOf, NumbersTextsAndListsComeBack) {
   EXPECT_EQ(reader.u32(), 0xDEADBEEF);
   EXPECT_EQ(reader.f32(), -0.15625f);
   EXPECT_EQ(reader.str(), "joint");
-  EXPECT_EQ(reader.u16_list(), (Array<std::uint16_t>{1, 0xFFFF}));
+  EXPECT_EQ(reader.u16_list(), (core::Array<std::uint16_t>{1, 0xFFFF}));
   std::uint32_t largest = 7;
-  EXPECT_EQ(reader.u32_list(&largest), (Array<std::uint32_t>{5, 0xFFFFFFFF, 6}));
+  EXPECT_EQ(reader.u32_list(&largest), (core::Array<std::uint32_t>{5, 0xFFFFFFFF, 6}));
   EXPECT_EQ(largest, 0xFFFFFFFFu);
-  EXPECT_EQ(reader.f32_list(), (Array<float>{0.5f, -3.0f}));
+  EXPECT_EQ(reader.f32_list(), (core::Array<float>{0.5f, -3.0f}));
   EXPECT_FALSE(reader.failed());
   EXPECT_EQ(reader.left(), 0u);
 }
@@ -97,7 +97,8 @@ TEST_P(ByteReaderOf, LongListsAreTheSameHoweverTheyLie) {
       ByteReader& reader = open(writer.take());
       reader.skip(before);
       std::uint32_t largest = 0;
-      ASSERT_EQ(reader.u32_list(&largest), Array<std::uint32_t>(wanted)) << before << " " << n;
+      ASSERT_EQ(reader.u32_list(&largest), core::Array<std::uint32_t>(wanted))
+          << before << " " << n;
       ASSERT_EQ(largest, n == 0 ? 0 : wanted.back());
       ASSERT_EQ(reader.u8(), 0x77);
     }
@@ -138,8 +139,9 @@ TEST_P(ByteReaderOf, AFileThatIsCutAnywhereGivesZerosAndOneError) {
     (void)reader.str();
     (void)reader.f32_list();
     ASSERT_TRUE(reader.failed()) << size;
-    const Error first = reader.error();
-    EXPECT_TRUE(first.code == ErrorCode::kTruncated || first.code == ErrorCode::kInvalidCount);
+    const core::Error first = reader.error();
+    EXPECT_TRUE(first.code == core::ErrorCode::kTruncated ||
+                first.code == core::ErrorCode::kInvalidCount);
     EXPECT_LE(*first.offset, size);
     EXPECT_EQ(reader.u32(), 0u);
     EXPECT_EQ(reader.str(), "");
@@ -158,7 +160,7 @@ TEST_P(ByteReaderOf, ACountIsBelievedOnlyIfItsElementsFit) {
   ByteReader& reader = open(bytes);
   EXPECT_EQ(reader.count(5), 0u);
   ASSERT_TRUE(reader.failed());
-  EXPECT_EQ(reader.error().code, ErrorCode::kInvalidCount);
+  EXPECT_EQ(reader.error().code, core::ErrorCode::kInvalidCount);
   EXPECT_EQ(*reader.error().offset, 0u);
   EXPECT_EQ(reader.error().message, "a count of 3 needs at least 15 bytes, only 12 are left");
   ByteReader& huge = open({0xFF, 0xFF, 0xFF, 0xFF, 0, 0});
@@ -172,7 +174,7 @@ TEST_P(ByteReaderOf, ACountBeyondTheCallersLimitIsRefused) {
   EXPECT_EQ(reader.str(), "\x01\x01");
   EXPECT_EQ(reader.str(), "");
   ASSERT_TRUE(reader.failed());
-  EXPECT_EQ(reader.error().code, ErrorCode::kLimitExceeded);
+  EXPECT_EQ(reader.error().code, core::ErrorCode::kLimitExceeded);
   EXPECT_EQ(*reader.error().offset, 6u);
   ByteReader& counted = open({0, 0, 0, 3, 1, 1, 1});
   counted.set_max_count(2);
@@ -188,7 +190,7 @@ TEST_P(ByteReaderOf, NothingIsReadBeyondARegion) {
   EXPECT_EQ(reader.left(), 2u);
   EXPECT_EQ(reader.u32(), 0u);
   ASSERT_TRUE(reader.failed());
-  EXPECT_EQ(reader.error().code, ErrorCode::kTruncated);
+  EXPECT_EQ(reader.error().code, core::ErrorCode::kTruncated);
   EXPECT_FALSE(reader.enter(0, 1)) << "not before the error is cleared";
   reader.clear_error();
   ASSERT_TRUE(reader.enter(900, 100));
@@ -196,7 +198,7 @@ TEST_P(ByteReaderOf, NothingIsReadBeyondARegion) {
   ASSERT_TRUE(reader.enter(11, 1));
   EXPECT_EQ(reader.u8(), 11);
   EXPECT_FALSE(reader.enter(1000, 1));
-  EXPECT_EQ(reader.error().code, ErrorCode::kTruncated);
+  EXPECT_EQ(reader.error().code, core::ErrorCode::kTruncated);
   reader.clear_error();
   EXPECT_FALSE(reader.enter(1, std::numeric_limits<std::uint64_t>::max())) << "the sum wraps";
 }
@@ -221,7 +223,7 @@ TEST_P(ByteReaderOf, BytesAndSkipsStayInside) {
   reader.clear_error();
   ASSERT_TRUE(reader.enter(0, 4));
   reader.skip(5);
-  EXPECT_EQ(reader.error().code, ErrorCode::kTruncated);
+  EXPECT_EQ(reader.error().code, core::ErrorCode::kTruncated);
 }
 
 TEST_P(ByteReaderOf, AnErrorNamesTheField) {
@@ -242,7 +244,7 @@ TEST(ByteReader, AFileThatIsCutWhileItIsReadIsAnError) {
   ByteReader reader(source);
   EXPECT_TRUE(reader.bytes(5000).empty());
   ASSERT_TRUE(reader.failed());
-  EXPECT_EQ(reader.error().code, ErrorCode::kIoRead);
+  EXPECT_EQ(reader.error().code, core::ErrorCode::kIoRead);
 }
 
 TEST(ByteReader, LittleIsReadOfWhatIsSkipped) {
@@ -255,4 +257,4 @@ TEST(ByteReader, LittleIsReadOfWhatIsSkipped) {
 }
 
 }  // namespace
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -6,7 +6,7 @@
 
 #include <array>
 
-namespace risorius::core {
+namespace risorius::bytes {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -42,4 +42,4 @@ TEST(ByteWriter, ASizeThatIsKnownLaterIsPutWhereItBelongs) {
 }
 
 }  // namespace
-}  // namespace risorius::core
+}  // namespace risorius::bytes

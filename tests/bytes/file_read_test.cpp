@@ -13,7 +13,7 @@
 #include <sys/stat.h>
 #endif
 
-namespace risorius::core {
+namespace risorius::bytes {
 namespace {
 
 namespace fs = std::filesystem;
@@ -54,11 +54,11 @@ TEST_F(FileRead, WhatIsNotThereOrNoFileIsSaid) {
   for (const ReadBy by : kBoth) {
     const auto gone = read_file(folder_ / "gone", by);
     ASSERT_FALSE(gone.has_value());
-    EXPECT_EQ(gone.error().code, ErrorCode::kIoOpen);
+    EXPECT_EQ(gone.error().code, core::ErrorCode::kIoOpen);
     EXPECT_NE(gone.error().message.find("No such file"), std::string::npos);
     const auto folder = read_file(folder_, by);
     ASSERT_FALSE(folder.has_value());
-    EXPECT_EQ(folder.error().code, ErrorCode::kIoOpen);
+    EXPECT_EQ(folder.error().code, core::ErrorCode::kIoOpen);
     EXPECT_NE(folder.error().message.find("is a folder, a file was expected"), std::string::npos);
   }
 }
@@ -101,4 +101,4 @@ TEST_F(FileRead, APipeIsNoPlainFileAndNobodyWaitsForIt) {
 #endif
 
 }  // namespace
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -17,7 +17,7 @@
 #include <unistd.h>
 #endif
 
-namespace risorius::core {
+namespace risorius::bytes {
 namespace {
 
 using testing_support::read_file;
@@ -90,7 +90,7 @@ TEST_F(FileWrite, WhateverFailsTheOldFileStaysAndNothingElse) {
     reason = ENOSPC;
     const auto status = write_file_atomically(folder_ / "a", new_, kCalls);
     ASSERT_FALSE(status.has_value()) << call;
-    EXPECT_EQ(status.error().code, ErrorCode::kIoWrite);
+    EXPECT_EQ(status.error().code, core::ErrorCode::kIoWrite);
     EXPECT_EQ(status.error().message, "cannot write " + (folder_ / "a").string() +
                                           ": No space left on device; the file of that name from "
                                           "before is unchanged")
@@ -129,7 +129,7 @@ TEST_F(FileWrite, AFileInPlaceOfTheFolderIsToldFromNoFolderWhateverTheSystemSays
   failing = 'o', reason = ENOENT;
   for (const auto& [name, said] : {std::pair{"file", "a file stands where its folder should be"},
                                    std::pair{"none", "its folder is not there"}}) {
-    const Status written = write_file_atomically(folder_ / name / "a", Bytes{1}, kCalls);
+    const core::Status written = write_file_atomically(folder_ / name / "a", Bytes{1}, kCalls);
     ASSERT_FALSE(written);
     EXPECT_NE(written.error().describe().find(said), std::string::npos)
         << written.error().describe();
@@ -265,4 +265,4 @@ TEST_F(FileWrite, ANewFileHasTheUsualRightsAnOldOneItsOwnAndASecretIsNeverOpen) 
 #endif
 
 }  // namespace
-}  // namespace risorius::core
+}  // namespace risorius::bytes

@@ -23,7 +23,7 @@ Bytes must_encode(const Clip& clip, std::size_t block_frames = 100) {
 }
 
 Reader must_open(const Bytes& bytes, Ends ends = Ends::kMustBeWhole) {
-  auto reader = Reader::open(std::make_unique<core::SpanSource>(bytes), ends);
+  auto reader = Reader::open(std::make_unique<bytes::SpanSource>(bytes), ends);
   EXPECT_TRUE(reader.has_value()) << reader.error().describe();
   return std::move(reader).value();
 }

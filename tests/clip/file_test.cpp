@@ -90,24 +90,24 @@ char failing = 0;
 
 int sync(int file) {
   asked += 's';
-  if (failing != 's') return core::system_file_calls().sync(file);
+  if (failing != 's') return bytes::system_file_calls().sync(file);
   errno = EIO;
   return -1;
 }
 int close(int file) {
   asked += 'c';
-  const int done = core::system_file_calls().close(file);
+  const int done = bytes::system_file_calls().close(file);
   errno = EIO;
   return failing == 'c' ? -1 : done;
 }
 int rename(const fs::path& from, const fs::path& to) {
   asked += 'r';
   errno = EIO;
-  return failing == 'r' ? -1 : core::system_file_calls().rename(from, to);
+  return failing == 'r' ? -1 : bytes::system_file_calls().rename(from, to);
 }
 
 TEST_F(ClipRecording, IsOnTheDiskBeforeItTakesItsNameAndStaysInPartIfThatFails) {
-  core::FileCalls calls = core::system_file_calls();
+  bytes::FileCalls calls = bytes::system_file_calls();
   calls.sync = sync;
   calls.close = close;
   calls.rename = rename;

@@ -55,7 +55,7 @@ TEST(ClipMemory, OfAnOpenReaderGrowsWithTheFile) {
     }
     const Bytes bytes = *encode(clip);
     const HeapCount heap;
-    auto reader = Reader::open(std::make_unique<core::SpanSource>(bytes));
+    auto reader = Reader::open(std::make_unique<bytes::SpanSource>(bytes));
     ASSERT_TRUE(reader.has_value()) << reader.error().describe();
     std::vector<float> values(count);
     std::vector<std::uint32_t> moving;

@@ -742,7 +742,7 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
 
 // Whatever parse accepts converts or is refused; what was converted is as sound as its source.
 void expect_sound(const std::vector<std::uint8_t>& bytes, const CoordinateTarget& target) {
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   const core::Result<Dna> dna = parse(source);
   if (!dna) return;
   std::vector<Warning> warnings;

@@ -211,13 +211,13 @@ TEST(HostileMalformed, FilesAreUsableOrRefusedAsTheirKindAsks) {
 // ---- a file that changes while it is read
 
 // From a read on, the lowest byte of every word is one more: counts, above all.
-class ChangingSource final : public core::Source {
+class ChangingSource final : public bytes::Source {
  public:
   ChangingSource(const Bytes& bytes, std::size_t honest_reads, std::uint64_t phase)
       : bytes_(bytes), honest_(honest_reads), phase_(phase) {}
   std::uint64_t size() const override { return bytes_.size(); }
   std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override {
-    core::SpanSource memory(bytes_);
+    bytes::SpanSource memory(bytes_);
     const std::size_t n = memory.read(offset, out);
     if (reads_++ < honest_) return n;
     for (std::size_t i = 0; i < n; ++i) {

@@ -27,7 +27,7 @@ Bytes face(std::uint16_t minor) {
 core::Result<Dna> parse_within(const Bytes& bytes, const Limits& limits) {
   ParseOptions options;
   options.limits = limits;
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   return parse(source, options);
 }
 
@@ -67,7 +67,7 @@ TEST(DnaLimits, StopAListOfTooManyElements) {
 
 std::string face_as_json() {
   const Bytes bytes = face(8);
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   return *to_json(*parse(source));
 }
 

@@ -36,7 +36,7 @@ std::vector<Load> loads() {
           {"LOD 1", coarse}};
 }
 
-void expect_little_more_than_is_kept(core::Source& source, const ParseOptions& options) {
+void expect_little_more_than_is_kept(bytes::Source& source, const ParseOptions& options) {
   const HeapCount heap;
   const auto dna = parse(source, options);
   const std::size_t peak = heap.peak(), kept = heap.kept();
@@ -69,9 +69,9 @@ TEST(Memory, OfALoadIsLittleMoreThanWhatItKeeps) {
     }
     for (const Load& load : loads()) {
       SCOPED_TRACE(std::string(load.name) + ", 2." + std::to_string(minor));
-      core::SpanSource memory(bytes);
+      bytes::SpanSource memory(bytes);
       expect_little_more_than_is_kept(memory, load.options);
-      auto file = core::open_file(path);
+      auto file = bytes::open_file(path);
       ASSERT_TRUE(file.has_value());
       expect_little_more_than_is_kept(**file, load.options);
     }
@@ -84,7 +84,7 @@ TEST(Memory, OfALoadIsLittleMoreThanWhatItKeeps) {
 constexpr std::size_t kTimesTheBytes = 12, kBeside = 16 * 1024;
 
 std::size_t peak_of(const Bytes& bytes, bool* good = nullptr) {
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   const HeapCount heap;
   const bool read = parse(source).has_value();
   if (good != nullptr) *good = read;

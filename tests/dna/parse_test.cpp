@@ -17,7 +17,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 core::Result<Dna> parse_bytes(const Bytes& bytes, const ParseOptions& options = {}) {
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   return parse(source, options);
 }
 

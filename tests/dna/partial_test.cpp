@@ -24,7 +24,7 @@ struct Region {
   std::size_t size() const { return end - begin; }
 };
 
-class RecordingSource final : public core::Source {
+class RecordingSource final : public bytes::Source {
  public:
   explicit RecordingSource(const Bytes& bytes) : bytes_(bytes), reads_(bytes.size(), 0) {}
   std::uint64_t size() const override { return bytes_.size(); }
@@ -49,7 +49,7 @@ class RecordingSource final : public core::Source {
   std::size_t total_ = 0;
 };
 
-Dna must_parse(core::Source& source, const ParseOptions& options = {}) {
+Dna must_parse(bytes::Source& source, const ParseOptions& options = {}) {
   auto dna = parse(source, options);
   if (!dna) ADD_FAILURE() << dna.error().describe();
   return dna ? std::move(dna).value() : Dna{};
@@ -413,7 +413,7 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   mesh.skin_joint_indices = {0, 1, 2, 2, 1, 0};
   head.definition.lod_joint_mapping.rows[1] = {0, 1};
   const Bytes bytes = write_head(head, 8);
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   ParseOptions options;
   options.lods.lods = {1};
   const Dna dna = must_parse(source, options);
@@ -438,7 +438,7 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
       options.unreferenced_blend_shapes = false;
       options.machine_learned_behavior = (layers & 1) != 0;
       options.rbf_behavior = (layers & 2) != 0;
-      core::SpanSource source(bytes);
+      bytes::SpanSource source(bytes);
       const Dna dna = must_parse(source, options);
       const bool is_computed =
           control < 6 || (control < 8 ? options.machine_learned_behavior : options.rbf_behavior);
@@ -461,7 +461,7 @@ TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
   std::fill_n(file.bytes.begin() + static_cast<std::ptrdiff_t>(at), 4, std::uint8_t{0xff});
   ParseOptions options;
   options.rbf_behavior = false;
-  core::SpanSource source(file.bytes);
+  bytes::SpanSource source(file.bytes);
   const auto dna = parse(source, options);
   ASSERT_FALSE(dna.has_value());
   EXPECT_EQ(dna.error().code, core::ErrorCode::kInvalidCount);
@@ -479,7 +479,7 @@ TEST(PartialLoad, SaysWhereAJointIndexIsTooLarge) {
   for (const bool one_lod : {true, false}) {
     ParseOptions options;
     if (one_lod) options.lods.lods = {0};
-    core::SpanSource source(bytes);
+    bytes::SpanSource source(bytes);
     const auto dna = parse(source, options);
     ASSERT_FALSE(dna.has_value());
     EXPECT_EQ(dna.error().code, core::ErrorCode::kInvalidIndex);

@@ -21,7 +21,7 @@ Bytes find(const std::string& name) {
 }
 
 std::vector<dna::Finding> checked(const Bytes& bytes) {
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   return dna::check(source);
 }
 

@@ -21,7 +21,7 @@ namespace risorius::rig {
 namespace {
 
 using namespace testing_support;
-using core::ReadBy;
+using bytes::ReadBy;
 using std::filesystem::path;
 using Bytes = std::vector<std::uint8_t>;
 
@@ -205,7 +205,7 @@ TEST_F(RigFile, AFileOfAnotherUserGetsTheFullCheck) {
     EXPECT_FALSE(open(file, Trust::kOwner).has_value());
   } else {
     // Only root may give files away; a system file is another user's as well.
-    const auto other = core::read_file("/etc/passwd");
+    const auto other = bytes::read_file("/etc/passwd");
     ASSERT_TRUE(other.has_value());
     EXPECT_FALSE(other->is_own);
   }

@@ -43,12 +43,12 @@ std::string broken(const std::string& promise, const core::Error& error) {
 // ---- sources that are not memory
 
 // A file as parse sees it: piece by piece. From the given read on, every byte is another one.
-class PieceSource final : public core::Source {
+class PieceSource final : public bytes::Source {
  public:
   PieceSource(View bytes, std::size_t honest_reads) : bytes_(bytes), honest_(honest_reads) {}
   std::uint64_t size() const override { return bytes_.size(); }
   std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) override {
-    core::SpanSource memory(bytes_);
+    bytes::SpanSource memory(bytes_);
     const std::size_t n = memory.read(offset, out);
     if (reads_++ < honest_) return n;
     for (std::size_t i = 0; i < n; ++i) out[i] = static_cast<std::uint8_t>(out[i] + 1);
@@ -513,7 +513,7 @@ dna::CoordinateTarget target_of(View o) {
 }  // namespace
 
 Result<Dna> parse(View bytes, const ParseOptions& options) {
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   return dna::parse(source, options);
 }
 
@@ -522,7 +522,7 @@ std::string reading(View bytes, const Result<Dna>& dna) {
 }
 
 std::string checking(View bytes, bool is_good) {
-  core::SpanSource source(bytes);
+  bytes::SpanSource source(bytes);
   bool wrong = false;
   for (const dna::Finding& f : dna::check(source)) {
     wrong = wrong || f.is_error;

@@ -25,18 +25,18 @@ std::filesystem::path shortened(const std::filesystem::path& path) {
 
 core::Unexpected failure(const std::filesystem::path& path, const std::error_code& reason) {
   return fail(ErrorCode::kIoWrite, "",
-              "cannot write " + core::utf8(path) + ": " + core::write_trouble(reason));
+              "cannot write " + bytes::utf8(path) + ": " + bytes::write_trouble(reason));
 }
 
 }  // namespace
 
 core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, Head head,
                                             std::size_t block_frames,
-                                            const core::FileCalls& calls) {
+                                            const bytes::FileCalls& calls) {
   auto encoder = Encoder::create(std::move(head), block_frames);
   if (!encoder) return std::move(encoder).propagate();
   FileWriter writer(std::move(encoder).value());
-  writer.path_ = core::linked_file(path);
+  writer.path_ = bytes::linked_file(path);
   std::error_code ignored;
   if (std::filesystem::is_directory(path, ignored)) {
     return failure(path, std::make_error_code(std::errc::is_a_directory));
@@ -47,14 +47,14 @@ core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, H
 }
 
 // What an earlier recording left when it ended badly is never written over.
-std::error_code FileWriter::open_part(const core::FileCalls& calls) {
+std::error_code FileWriter::open_part(const bytes::FileCalls& calls) {
   constexpr int kMostParts = 100;
   std::filesystem::path base = path_;
   std::error_code error;
   for (int i = 1; i <= kMostParts && !file_; ++i) {
     part_ = base;
     part_ += i == 1 ? ".part" : "." + std::to_string(i) + ".part";
-    file_ = core::NewFile::create(part_, core::NewFile::Leftover::kKeep, error, calls);
+    file_ = bytes::NewFile::create(part_, bytes::NewFile::Leftover::kKeep, error, calls);
     if (error == std::errc::filename_too_long && base == path_) {
       base = shortened(path_);
       i = 0;

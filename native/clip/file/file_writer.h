@@ -16,9 +16,9 @@ namespace risorius::clip {
 class FileWriter {
  public:
   /// Fails: kInvalidArgument as Encoder; kIoWrite with the system's reason.
-  static core::Result<FileWriter> create(const std::filesystem::path& path, Head head,
-                                         std::size_t block_frames = kDefaultBlockFrames,
-                                         const core::FileCalls& calls = core::system_file_calls());
+  static core::Result<FileWriter> create(
+      const std::filesystem::path& path, Head head, std::size_t block_frames = kDefaultBlockFrames,
+      const bytes::FileCalls& calls = bytes::system_file_calls());
 
   /// As Encoder. Fails also: kIoWrite.
   core::Status append(std::span<const float> frames, std::span<const double> times);
@@ -36,12 +36,12 @@ class FileWriter {
 
  private:
   explicit FileWriter(Encoder encoder) : encoder_(std::move(encoder)) {}
-  std::error_code open_part(const core::FileCalls& calls);
+  std::error_code open_part(const bytes::FileCalls& calls);
   core::Status write_ready();
 
   Encoder encoder_;
   std::filesystem::path path_, part_;
-  std::optional<core::NewFile> file_;
+  std::optional<bytes::NewFile> file_;
   core::Status trouble_ = core::ok();  // bytes are missing, so what would follow is no clip
 };
 

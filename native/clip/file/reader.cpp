@@ -20,7 +20,7 @@ using core::ErrorCode;
 using core::fail;
 
 // The bytes from offset on; none when they are not all there.
-std::optional<Bytes> read_bytes(core::Source& source, std::uint64_t offset, std::uint64_t size) {
+std::optional<Bytes> read_bytes(bytes::Source& source, std::uint64_t offset, std::uint64_t size) {
   if (offset > source.size() || size > source.size() - offset) return std::nullopt;
   Bytes bytes(static_cast<std::size_t>(size));
   if (source.read(offset, bytes) != bytes.size()) return std::nullopt;
@@ -231,7 +231,7 @@ void Reader::find_blocks() {
   }
 }
 
-core::Result<Reader> Reader::open(std::unique_ptr<core::Source> source, Ends ends,
+core::Result<Reader> Reader::open(std::unique_ptr<bytes::Source> source, Ends ends,
                                   const Limits& limits) {
   Reader reader;
   reader.source_ = std::move(source);
@@ -397,7 +397,7 @@ core::Status Reader::resting(std::size_t block, std::span<float> values,
 }
 
 core::Result<Clip> decode(View bytes, Ends ends, const Limits& limits) {
-  auto opened = Reader::open(std::make_unique<core::SpanSource>(bytes), ends, limits);
+  auto opened = Reader::open(std::make_unique<bytes::SpanSource>(bytes), ends, limits);
   if (!opened) return std::move(opened).propagate();
   Reader& reader = *opened;
   Clip clip;

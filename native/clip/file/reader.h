@@ -30,7 +30,7 @@ class Reader {
  public:
   /// Reads the head and the index, no curve.
   /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kLimitExceeded.
-  static core::Result<Reader> open(std::unique_ptr<core::Source> source,
+  static core::Result<Reader> open(std::unique_ptr<bytes::Source> source,
                                    Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
 
   const Head& head() const { return head_; }
@@ -74,7 +74,7 @@ class Reader {
                           std::span<const std::uint32_t> controls, float* out, std::size_t stride,
                           double* out_times);
 
-  std::shared_ptr<core::Source> source_;
+  std::shared_ptr<bytes::Source> source_;
   Limits limits_;
   Head head_;
   std::uint64_t frames_ = 0, first_block_ = 0, end_ = 0;

@@ -5,9 +5,9 @@
 
 namespace risorius::dna::detail {
 
+using bytes::Field;
 using core::Buffer;
 using core::ErrorCode;
-using core::Field;
 using core::List;
 using core::PlanarArray;
 

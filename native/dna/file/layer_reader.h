@@ -50,12 +50,12 @@ class LayerReader {
   Places* places = nullptr;
   Known known{true, true};  // about what was read so far
 
-  explicit LayerReader(core::ByteReader& reader) : r_(reader) {}
+  explicit LayerReader(bytes::ByteReader& reader) : r_(reader) {}
 
   template <class Body>
   void group(Name name, Body body) {
     if (*name.dna == '\0') return body();
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     note(r_.position());
     body();
   }
@@ -90,26 +90,26 @@ class LayerReader {
   }
   template <std::size_t kPlanes>
   void field(Name name, core::PlanarArray<kPlanes>& v) {
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     const std::uint64_t at = r_.position();
     v = planes<kPlanes>();
     note(at, 4, static_cast<std::uint32_t>(v.count()));
   }
   template <class T>
   void field(Name name, std::vector<T>& v) {
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     note(r_.position());
     list(v);
   }
   template <class T>
   void field(Name name, core::List<T>& v) {
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     note(r_.position());
     list(v);
   }
   template <class T>
   void field(Name name, T& v) {
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     note(r_.position());
     describe(*this, v);
   }
@@ -130,13 +130,13 @@ class LayerReader {
   void add_place(const Place& place);
   template <class T, class Read>
   void scalar(Name name, T& v, Read read) {
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     note(r_.position());
     v = read();
   }
   template <class Read>
   void numbers(Name name, std::uint32_t element_size, Read read) {
-    core::Field field(r_, name.dna);
+    bytes::Field field(r_, name.dna);
     note(r_.position(), element_size);
     read();
   }
@@ -165,7 +165,7 @@ class LayerReader {
     const std::uint32_t n = r_.count(empty_size<T>());
     v.reserve(n);
     for (std::uint32_t i = 0; i < n && !r_.failed(); ++i) {
-      core::Field item(r_, "", i);
+      bytes::Field item(r_, "", i);
       note(r_.position());
       element(v.emplace_back());
     }
@@ -185,7 +185,7 @@ class LayerReader {
   bool channel_is_wanted(std::uint16_t channel) const;
   std::size_t cut_vertex(float* weights, std::uint16_t* joints, std::size_t n);
 
-  core::ByteReader& r_;
+  bytes::ByteReader& r_;
   std::uint32_t largest_ = 0;  // number in the uint32 list that was read last
 };
 

@@ -16,7 +16,7 @@ class LayerWriter {
  public:
   bool mesh_sizes = true;  // as in LayerReader
 
-  explicit LayerWriter(core::ByteWriter& writer) : w_(writer) {}
+  explicit LayerWriter(bytes::ByteWriter& writer) : w_(writer) {}
 
   template <class Body>
   void group(Name, Body body) {
@@ -98,7 +98,7 @@ class LayerWriter {
     for (std::size_t i = 0; i < n; ++i) item(offsets[i], offsets[i + 1] - offsets[i]);
   }
 
-  core::ByteWriter& w_;
+  bytes::ByteWriter& w_;
 };
 
 }  // namespace risorius::dna::detail

@@ -15,11 +15,11 @@ namespace risorius::dna {
 
 namespace {
 
-using core::ByteReader;
+using bytes::ByteReader;
+using bytes::Field;
 using core::Error;
 using core::ErrorCode;
 using core::fail;
-using core::Field;
 using core::Result;
 using core::Status;
 using detail::LayerReader;
@@ -71,7 +71,7 @@ Status read_header(ByteReader& r, const Limits& limits, Dna& dna) {
 // one is read; otherwise the first error ends it.
 class Parser {
  public:
-  Parser(core::Source& source, const ParseOptions& options, detail::Places* places,
+  Parser(bytes::Source& source, const ParseOptions& options, detail::Places* places,
          std::vector<Finding>* findings)
       : file_size_(source.size()), r_(source), layer_(r_), options_(options), findings_(findings) {
     r_.set_max_count(options.limits.max_count);
@@ -389,7 +389,7 @@ class Parser {
   std::optional<Error> error_;
 };
 
-Result<Dna> run_parser(core::Source& source, const ParseOptions& options, detail::Known& known) {
+Result<Dna> run_parser(bytes::Source& source, const ParseOptions& options, detail::Known& known) {
   Parser parser(source, options, nullptr, nullptr);
   Result<Dna> dna = parser.run();
   known = parser.known();
@@ -397,7 +397,7 @@ Result<Dna> run_parser(core::Source& source, const ParseOptions& options, detail
 }
 
 // The same bytes once more, this time noting where each field lies: the price of an error.
-Error with_offset(core::Source& source, const ParseOptions& options, Error error) {
+Error with_offset(bytes::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
   detail::Places places({error.where});
   static_cast<void>(Parser(source, options, &places, nullptr).run());
@@ -405,7 +405,7 @@ Error with_offset(core::Source& source, const ParseOptions& options, Error error
   return error;
 }
 
-void add_offsets(core::Source& source, const ParseOptions& options,
+void add_offsets(bytes::Source& source, const ParseOptions& options,
                  std::vector<Finding>& findings) {
   std::set<std::string> fields;
   for (const Finding& f : findings) {
@@ -422,7 +422,7 @@ void add_offsets(core::Source& source, const ParseOptions& options,
 
 }  // namespace
 
-Result<Dna> parse(core::Source& source, const ParseOptions& options) {
+Result<Dna> parse(bytes::Source& source, const ParseOptions& options) {
   detail::Known known;
   Result<Dna> dna = run_parser(source, options, known);
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
@@ -438,7 +438,7 @@ Result<Dna> parse(core::Source& source, const ParseOptions& options) {
   return dna;
 }
 
-std::vector<Finding> check(core::Source& source, const Limits& limits) {
+std::vector<Finding> check(bytes::Source& source, const Limits& limits) {
   ParseOptions options;
   options.limits = limits;
   std::vector<Finding> findings;

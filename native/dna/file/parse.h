@@ -43,10 +43,10 @@ struct ParseOptions {
 /// kInvalidCount, kInvalidLength, kInvalidIndex, kInvalidValue, kLimitExceeded, kIoRead,
 /// kInvalidArgument (LODs that are not there), each with the field and, except for the last, the
 /// byte offset. Cost: allocates at most a small constant times the bytes present.
-core::Result<Dna> parse(core::Source& source, const ParseOptions& options = {});
+core::Result<Dna> parse(bytes::Source& source, const ParseOptions& options = {});
 
 /// Everything that is wrong or odd in a file, in its order, each with field and byte offset. A
 /// layer that cannot be read does not hide the others.
-std::vector<Finding> check(core::Source& source, const Limits& limits = {});
+std::vector<Finding> check(bytes::Source& source, const Limits& limits = {});
 
 }  // namespace risorius::dna

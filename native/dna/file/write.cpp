@@ -16,7 +16,7 @@ namespace risorius::dna {
 
 namespace {
 
-using core::ByteWriter;
+using bytes::ByteWriter;
 using core::ErrorCode;
 using core::fail;
 using core::Result;
