@@ -92,45 +92,34 @@ std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Dou
   return out;
 }
 
-Fit fit_joints(const Doubles& neutral, const Floats& displacements, const Indices& edges,
-               const Doubles& importance, const Doubles& positions, const Doubles& rotations,
-               const Doubles& translations, std::size_t joints, std::size_t influences,
-               double smoothness, double emphasis, std::size_t rounds, bool symmetric,
-               std::size_t threads, double least_effect, bool bound, const Doubles& pivots,
-               const std::vector<std::vector<std::uint32_t>>& pivot_expressions,
-               py::object progress) {
-  const author::Shapes input = shapes(neutral, displacements, edges, importance);
-  author::FitOptions options;
-  options.joints = joints;
-  options.influences = influences;
-  options.smoothness = smoothness;
-  options.emphasis = emphasis;
-  options.rounds = rounds;
-  options.symmetric = symmetric;
-  options.threads = threads;
-  options.least_effect = least_effect;
-  options.bound = bound;
-  options.given = given_joints(positions, rotations, translations, input.expressions);
-  if (static_cast<std::size_t>(pivots.size()) != 3 * pivot_expressions.size()) {
-    shape_error("pivots", "(P, 3)", pivots);
+/// Joints that are there, with the motions of each.
+struct GivenJoints {
+  std::vector<author::GivenJoint> joints;
+};
+
+/// float64[J, 3] positions, float64[E, J, 3] motions and uint32[J] or no joints of the other side.
+GivenJoints given(const Doubles& positions, const Doubles& rotations, const Doubles& translations,
+                  const Indices& mirrored) {
+  if (positions.ndim() != 2 || positions.shape(1) != 3) {
+    shape_error("positions", "(J, 3)", positions);
   }
-  for (std::size_t i = 0; i < pivot_expressions.size(); ++i) {
-    author::Pivot pivot;
-    std::copy_n(pivots.data() + 3 * i, 3, pivot.position.begin());
-    pivot.expressions = pivot_expressions[i];
-    options.pivots.push_back(std::move(pivot));
+  if (rotations.ndim() != 3) shape_error("rotations", "(E, J, 3)", rotations);
+  const auto expressions = static_cast<std::size_t>(rotations.shape(0));
+  GivenJoints out{given_joints(positions, rotations, translations, expressions)};
+  if (mirrored.size() == 0) return out;
+  if (static_cast<std::size_t>(mirrored.size()) != out.joints.size()) {
+    shape_error("mirrored", "(J,)", mirrored);
   }
-  Teller teller{std::move(progress), nullptr};
-  auto result = [&] {
-    const py::gil_scoped_release released;
-    return author::fit_joints(input, options, std::ref(teller));
-  }();
-  if (teller.raised) std::rethrow_exception(teller.raised);
-  return unwrap(std::move(result));
+  for (std::size_t j = 0; j < out.joints.size(); ++j) out.joints[j].mirrored = mirrored.data()[j];
+  return out;
 }
 
-author::StartWeights start_weights_of(const Indices& joints, const Floats& weights) {
-  if (joints.ndim() != 2 || weights.ndim() != 2) shape_error("start", "(V, n)", joints);
+author::Pivot pivot(const std::array<double, 3>& position, std::vector<std::uint32_t> expressions) {
+  return {position, std::move(expressions)};
+}
+
+author::StartWeights start_weights(const Indices& joints, const Floats& weights) {
+  if (joints.ndim() != 2 || weights.ndim() != 2) shape_error("joints", "(V, n)", joints);
   author::StartWeights out;
   out.influences = static_cast<std::size_t>(joints.shape(1));
   out.joints.assign(joints.data(), joints.data() + joints.size());
@@ -138,54 +127,52 @@ author::StartWeights start_weights_of(const Indices& joints, const Floats& weigh
   return out;
 }
 
-Fit fit_weights(const Doubles& neutral, const Floats& displacements, const Indices& edges,
-                const Doubles& importance, const Doubles& positions, const Doubles& rotations,
-                const Doubles& translations, const Indices& mirrored, const Indices& start_joints,
-                const Floats& start_weights, std::size_t influences, double smoothness,
-                bool symmetric, std::size_t threads) {
-  const author::Shapes input = shapes(neutral, displacements, edges, importance);
-  author::FitOptions options;
-  options.influences = influences;
-  options.smoothness = smoothness;
-  options.symmetric = symmetric;
-  options.threads = threads;
-  auto joints = given_joints(positions, rotations, translations, input.expressions);
-  if (mirrored.size() != 0) {
-    if (static_cast<std::size_t>(mirrored.size()) != joints.size()) {
-      shape_error("mirrored", "(J,)", mirrored);
-    }
-    for (std::size_t j = 0; j < joints.size(); ++j) joints[j].mirrored = mirrored.data()[j];
+/// The options with the given joints, whose motions are of the shapes' expressions.
+author::FitOptions with_given(author::FitOptions options, const author::Shapes& shapes,
+                              const GivenJoints& given) {
+  for (const author::GivenJoint& joint : given.joints) {
+    if (joint.motions.empty() || joint.motions.size() == shapes.expressions) continue;
+    throw py::value_error("rotations: has " + std::to_string(joint.motions.size()) +
+                          " expressions, the shapes have " + std::to_string(shapes.expressions));
   }
-  const author::StartWeights start = start_weights_of(start_joints, start_weights);
+  options.given = given.joints;
+  options.joints += given.joints.size();
+  return options;
+}
+
+/// What `work` returns, without the GIL.
+template <class Work>
+Fit fitted(const Work& work) {
   auto result = [&] {
     const py::gil_scoped_release released;
-    return author::fit_weights(input, joints, options, start);
+    return work();
   }();
   return unwrap(std::move(result));
 }
 
-Fit fit_motions(const Doubles& neutral, const Floats& displacements, const Indices& edges,
-                const Doubles& positions, const Doubles& rotations, const Doubles& translations,
-                const Indices& weight_joints, const Floats& weights, const Doubles& pivots,
-                const std::vector<std::uint32_t>& at, double emphasis, std::size_t threads,
-                double least_effect) {
-  const author::Shapes input = shapes(neutral, displacements, edges, Doubles(0));
-  author::FitOptions options;
-  options.emphasis = emphasis;
-  options.threads = threads;
-  options.least_effect = least_effect;
-  options.given = given_joints(positions, rotations, translations, input.expressions);
-  options.joints = options.given.size() + at.size();
-  options.pivots.resize(static_cast<std::size_t>(pivots.size()) / 3);
-  for (std::size_t i = 0; i < options.pivots.size(); ++i) {
-    std::copy_n(pivots.data() + 3 * i, 3, options.pivots[i].position.begin());
-  }
-  const author::StartWeights start = start_weights_of(weight_joints, weights);
+Fit fit_joints(const author::Shapes& shapes, const GivenJoints& given,
+               const author::FitOptions& options, py::object progress) {
+  const author::FitOptions all = with_given(options, shapes, given);
+  Teller teller{std::move(progress), nullptr};
   auto result = [&] {
     const py::gil_scoped_release released;
-    return author::fit_motions(input, options, start, at);
+    return author::fit_joints(shapes, all, std::ref(teller));
   }();
+  if (teller.raised) std::rethrow_exception(teller.raised);
   return unwrap(std::move(result));
+}
+
+Fit fit_weights(const author::Shapes& shapes, const GivenJoints& given,
+                const author::FitOptions& options, const author::StartWeights& start) {
+  const author::FitOptions all = with_given(options, shapes, given);
+  return fitted([&] { return author::fit_weights(shapes, all.given, all, start); });
+}
+
+Fit fit_motions(const author::Shapes& shapes, const GivenJoints& given,
+                const author::FitOptions& options, const author::StartWeights& weights,
+                const std::vector<std::uint32_t>& at) {
+  const author::FitOptions all = with_given(options, shapes, given);
+  return fitted([&] { return author::fit_motions(shapes, all, weights, at); });
 }
 
 /// float64[expressions, joints, 3] of one half of the motions.
@@ -242,9 +229,33 @@ py::tuple simplify(const Floats& positions, const Floats& attributes, const Indi
   return py::make_tuple(found, out.error);
 }
 
-}  // namespace
+void bind_fit_inputs(py::module_& m) {
+  py::class_<author::Shapes>(m, "FitShapes", "A mesh and the displacements of its expressions.")
+      .def(py::init(&shapes), py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
+           py::arg("importance") = Doubles(0));
+  py::class_<GivenJoints>(m, "GivenJoints", "Joints that are there, and their motions.")
+      .def(py::init(&given), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
+           py::arg("mirrored") = Indices(0));
+  py::class_<author::Pivot>(m, "FitPivot", "A point that some expressions turn about.")
+      .def(py::init(&pivot), py::arg("position"), py::arg("expressions"));
+  py::class_<author::StartWeights>(m, "FitWeights", "Joints and weights of each vertex.")
+      .def(py::init(&start_weights), py::arg("joints"), py::arg("weights"));
+  using Options = author::FitOptions;
+  py::class_<Options>(m, "FitSettings", "risorius.author.FitOptions, and the pivots.")
+      .def(py::init<>())
+      .def_readwrite("joints", &Options::joints, "New ones.")
+      .def_readwrite("influences", &Options::influences)
+      .def_readwrite("smoothness", &Options::smoothness)
+      .def_readwrite("symmetric", &Options::symmetric)
+      .def_readwrite("emphasis", &Options::emphasis)
+      .def_readwrite("least_effect", &Options::least_effect)
+      .def_readwrite("bound", &Options::bound)
+      .def_readwrite("rounds", &Options::rounds)
+      .def_readwrite("threads", &Options::threads)
+      .def_readwrite("pivots", &Options::pivots);
+}
 
-void bind_author(py::module_& m) {
+void bind_fits(py::module_& m) {
   py::class_<Fit>(m, "JointFit", "Joints, weights and joint motions that repeat shapes.")
       .def_property_readonly(
           "joints",
@@ -271,24 +282,22 @@ void bind_author(py::module_& m) {
           "translations",
           [](const Fit& f) { return motions(f, &author::JointMotion::translation); },
           "float64[E, J, 3]: shifts of the joint.");
-  m.def("fit_joints", &fit_joints, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
-        py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
-        py::kw_only(), py::arg("joints"), py::arg("influences"), py::arg("smoothness"),
-        py::arg("emphasis"), py::arg("rounds"), py::arg("symmetric"), py::arg("threads"),
-        py::arg("least_effect"), py::arg("bound"), py::arg("pivots"), py::arg("pivot_expressions"),
+  m.def("fit_joints", &fit_joints, py::arg("shapes"), py::arg("given"), py::arg("options"),
         py::arg("progress"), "JointFit: see risorius.author.fitting.");
-  m.def("fit_weights", &fit_weights, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
-        py::arg("importance"), py::arg("positions"), py::arg("rotations"), py::arg("translations"),
-        py::arg("mirrored"), py::arg("start_joints"), py::arg("start_weights"), py::kw_only(),
-        py::arg("influences"), py::arg("smoothness"), py::arg("symmetric"), py::arg("threads"),
-        "JointFit with these joints: see risorius.author.fitting.");
-  m.def("fit_motions", &fit_motions, py::arg("neutral"), py::arg("displacements"), py::arg("edges"),
-        py::arg("positions"), py::arg("rotations"), py::arg("translations"),
-        py::arg("weight_joints"), py::arg("weights"), py::kw_only(), py::arg("pivots"),
-        py::arg("at"), py::arg("emphasis"), py::arg("threads"), py::arg("least_effect"),
+  m.def("fit_weights", &fit_weights, py::arg("shapes"), py::arg("given"), py::arg("options"),
+        py::arg("start"), "JointFit with these joints: see risorius.author.fitting.");
+  m.def("fit_motions", &fit_motions, py::arg("shapes"), py::arg("given"), py::arg("options"),
+        py::arg("weights"), py::arg("at"),
         "JointFit with these weights: see risorius.author.fitting.");
   m.def("simplify", &simplify, py::arg("positions"), py::arg("attributes"), py::arg("triangles"),
         py::arg("count"), "See risorius.author.simplify.");
+}
+
+}  // namespace
+
+void bind_author(py::module_& m) {
+  bind_fit_inputs(m);
+  bind_fits(m);
 }
 
 }  // namespace risorius::bindings

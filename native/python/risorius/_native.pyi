@@ -1171,64 +1171,72 @@ class JointFit:
     def translations(self) -> npt.NDArray[np.float64]:
         """float64[E, J, 3]: shifts of the joint."""
 
+class FitShapes:
+    """A mesh and the displacements of its expressions."""
+
+    def __init__(
+        self,
+        neutral: npt.ArrayLike,
+        displacements: npt.ArrayLike,
+        edges: npt.ArrayLike,
+        importance: npt.ArrayLike = ...,
+    ) -> None: ...
+
+class GivenJoints:
+    """Joints that are there, and their motions."""
+
+    def __init__(
+        self,
+        positions: npt.ArrayLike,
+        rotations: npt.ArrayLike,
+        translations: npt.ArrayLike,
+        mirrored: npt.ArrayLike = ...,
+    ) -> None: ...
+
+class FitPivot:
+    """A point that some expressions turn about."""
+
+    def __init__(self, position: npt.ArrayLike, expressions: Sequence[int]) -> None: ...
+
+class FitWeights:
+    """Joints and weights of each vertex."""
+
+    def __init__(self, joints: npt.ArrayLike, weights: npt.ArrayLike) -> None: ...
+
+class FitSettings:
+    """risorius.author.FitOptions, and the pivots."""
+
+    joints: int
+    influences: int
+    smoothness: float
+    symmetric: bool
+    emphasis: float
+    least_effect: float
+    bound: bool
+    rounds: int
+    threads: int
+    pivots: Sequence[FitPivot]
+    def __init__(self) -> None: ...
+
 def fit_joints(
-    neutral: npt.ArrayLike,
-    displacements: npt.ArrayLike,
-    edges: npt.ArrayLike,
-    importance: npt.ArrayLike,
-    positions: npt.ArrayLike,
-    rotations: npt.ArrayLike,
-    translations: npt.ArrayLike,
-    *,
-    joints: int,
-    influences: int,
-    smoothness: float,
-    emphasis: float,
-    rounds: int,
-    symmetric: bool,
-    threads: int,
-    least_effect: float,
-    bound: bool,
-    pivots: npt.ArrayLike,
-    pivot_expressions: Sequence[Sequence[int]],
+    shapes: FitShapes,
+    given: GivenJoints,
+    options: FitSettings,
     progress: Callable[[float], bool | None] | None,
 ) -> JointFit:
     """JointFit: see risorius.author.fitting."""
 
 def fit_weights(
-    neutral: npt.ArrayLike,
-    displacements: npt.ArrayLike,
-    edges: npt.ArrayLike,
-    importance: npt.ArrayLike,
-    positions: npt.ArrayLike,
-    rotations: npt.ArrayLike,
-    translations: npt.ArrayLike,
-    mirrored: npt.ArrayLike,
-    start_joints: npt.ArrayLike,
-    start_weights: npt.ArrayLike,
-    *,
-    influences: int,
-    smoothness: float,
-    symmetric: bool,
-    threads: int,
+    shapes: FitShapes, given: GivenJoints, options: FitSettings, start: FitWeights
 ) -> JointFit:
     """JointFit with these joints: see risorius.author.fitting."""
 
 def fit_motions(
-    neutral: npt.ArrayLike,
-    displacements: npt.ArrayLike,
-    edges: npt.ArrayLike,
-    positions: npt.ArrayLike,
-    rotations: npt.ArrayLike,
-    translations: npt.ArrayLike,
-    weight_joints: npt.ArrayLike,
-    weights: npt.ArrayLike,
-    *,
-    pivots: npt.ArrayLike,
+    shapes: FitShapes,
+    given: GivenJoints,
+    options: FitSettings,
+    weights: FitWeights,
     at: Sequence[int],
-    emphasis: float,
-    threads: int,
-    least_effect: float,
 ) -> JointFit:
     """JointFit with these weights: see risorius.author.fitting."""
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ from .pivots import Pivot
 __all__ = ["FitOptions", "JointFit", "Progress", "bounded", "fit_joints", "fit_weights"]
 
 Progress = Callable[[float], bool | None]
+
+_IN_THE_MIDDLE = 0xFFFFFFFF  # kInTheMiddle of native/author/fit.h
 
 
 @dataclass(frozen=True)
@@ -80,28 +82,11 @@ def fit_joints(
     Raises:
         DnaError: a value that is not finite, no motion at all, options out of their range.
     """
-    o = options or FitOptions()
-    rotations, translations = split_motions(motions, given)
     return _native.fit_joints(
-        neutral,
-        displacements,
-        edges,
-        np.zeros(0) if importance is None else importance,
-        given,
-        rotations,
-        translations,
-        joints=len(given) + o.joints,
-        influences=o.influences,
-        smoothness=o.smoothness,
-        emphasis=o.emphasis,
-        rounds=o.rounds,
-        symmetric=o.symmetric,
-        threads=o.threads,
-        least_effect=o.least_effect,
-        bound=o.bound,
-        pivots=np.array([pivot.position for pivot in pivots]).reshape(-1, 3),
-        pivot_expressions=[list(pivot.expressions) for pivot in pivots],
-        progress=progress,
+        _shapes(neutral, displacements, edges, importance),
+        _given(given, motions),
+        _settings(options, pivots),
+        progress,
     )
 
 
@@ -133,21 +118,14 @@ def fit_motions(
     Raises:
         DnaError: a value that is not finite, no motion at all, a joint or pivot that is not there.
     """
-    o = options or FitOptions()
-    rotations, translations = split_motions(motions, given)
+    settings = _settings(options, pivots)
+    settings.joints = len(at)
     return _native.fit_motions(
-        neutral,
-        displacements,
-        edges,
-        given,
-        rotations,
-        translations,
-        *_rows(weights),
-        pivots=np.array([pivot.position for pivot in pivots]).reshape(-1, 3),
-        at=[0xFFFFFFFF if pivot is None else pivot for pivot in at],
-        emphasis=o.emphasis,
-        threads=o.threads,
-        least_effect=o.least_effect,
+        _shapes(neutral, displacements, edges),
+        _given(given, motions),
+        settings,
+        _weights(weights),
+        [_IN_THE_MIDDLE if pivot is None else pivot for pivot in at],
     )
 
 
@@ -179,23 +157,47 @@ def fit_weights(
     Raises:
         DnaError: as fit_joints.
     """
-    o = options or FitOptions()
-    rotations, translations = split_motions(motions, given)
     return _native.fit_weights(
-        neutral,
-        displacements,
-        edges,
-        np.zeros(0) if importance is None else importance,
-        given,
-        rotations,
-        translations,
-        np.zeros(0, np.uint32) if mirrored is None else mirrored.astype(np.uint32),
-        *_rows(np.zeros((len(neutral), 0)) if start is None else start),
-        influences=o.influences,
-        smoothness=o.smoothness,
-        symmetric=o.symmetric,
-        threads=o.threads,
+        _shapes(neutral, displacements, edges, importance),
+        _given(given, motions, mirrored),
+        _settings(options),
+        _weights(np.zeros((len(neutral), 0)) if start is None else start),
     )
+
+
+def _shapes(
+    neutral: Doubles,
+    displacements: npt.NDArray[np.float32],
+    edges: npt.NDArray[np.uint32],
+    importance: Doubles | None = None,
+) -> _native.FitShapes:
+    """The native form of a mesh and its expressions."""
+    return _native.FitShapes(
+        neutral, displacements, edges, np.zeros(0) if importance is None else importance
+    )
+
+
+def _given(
+    positions: Doubles, motions: Doubles, mirrored: Ints | None = None
+) -> _native.GivenJoints:
+    """The native form of joints float64[J, 3] and their motions float64[E, J, 3, 4]."""
+    rotations, translations = split_motions(motions, positions)
+    others = np.zeros(0, np.uint32) if mirrored is None else mirrored.astype(np.uint32)
+    return _native.GivenJoints(positions, rotations, translations, others)
+
+
+def _settings(options: FitOptions | None, pivots: Sequence[Pivot] = ()) -> _native.FitSettings:
+    """The native form of the options; both have fields of the same names."""
+    settings = _native.FitSettings()
+    for name, value in asdict(options or FitOptions()).items():
+        setattr(settings, name, value)
+    settings.pivots = [_native.FitPivot(p.position, list(p.expressions)) for p in pivots]
+    return settings
+
+
+def _weights(dense: Doubles) -> _native.FitWeights:
+    """The native form of dense weights float64[V, J]: each row without its zeros."""
+    return _native.FitWeights(*_rows(dense))
 
 
 def _rows(dense: Doubles) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.float32]]:
