@@ -11,13 +11,14 @@ from pathlib import Path
 import numpy as np
 from risorius.author import find_reference
 from risorius.files import fileio
-from risorius.sample.build import RIG, WEIGHTS, assemble
+from risorius.sample.blend_shape_face import assemble
+from risorius.sample.build import RIG, WEIGHTS
 from risorius.sample.references import SHIPPED
 from risorius.sample.source import Source, fetch
 
 
 def main() -> None:
-    """Write native/python/risorius/sample/joints.npz."""
+    """Write native/python/risorius/sample/references/joints.npz."""
     man, _, _ = assemble(Source(fetch(offline=False)), print)
     reference = find_reference(man, RIG)
     for name, rows in reference.weights.items():
@@ -26,7 +27,7 @@ def main() -> None:
         even[np.arange(len(even)), even.argmax(axis=1)] += WEIGHTS - even.sum(axis=1)
         reference.weights[name] = even / WEIGHTS
     package = Path(__file__).parents[1] / "native" / "python" / "risorius"
-    path = package / "sample" / SHIPPED.name
+    path = package / "sample" / "references" / SHIPPED.name
     fileio.write_bytes(path, reference.to_bytes())
     print(f"{path}: {path.stat().st_size} bytes")
 

@@ -23,18 +23,20 @@ from risorius.author.input.obj import ObjMesh
 from risorius.author.input.shape_face import ShapeSet, check_shapes, make_shape_face
 from risorius.cli.author import as_lines
 from risorius.controls.arkit import mapping
-from risorius.sample import build
+from risorius.sample import blend_shape_face
 from risorius.sample.people import MAN
 from risorius.sample.source import Source, fetch
 
 
 def old_head(source):
     """Positions [V, 3] in cm, polygons and the ARKit units' displacements of the base head."""
-    _, parts, body = build.assemble(source, print, MAN)
+    _, parts, body = blend_shape_face.assemble(source, print, MAN)
     part = next(p for p in parts if p.name == "head_lod1_mesh")
     count = len(body.positions)
-    units = {name: part.carry(source.face_unit(name, count)) * build.CM for name in mapping()}
-    return part.carry(body.positions) * build.CM, part.polygons.faces, units
+    units = {
+        name: part.carry(source.face_unit(name, count)) * blend_shape_face.CM for name in mapping()
+    }
+    return part.carry(body.positions) * blend_shape_face.CM, part.polygons.faces, units
 
 
 def remeshed(positions, faces, voxel):

@@ -8,7 +8,7 @@ import functools
 
 import pytest
 from conftest import _not_run
-from risorius.sample import build, people, source
+from risorius.sample import blend_shape_face, people, source
 
 
 @functools.cache
@@ -28,7 +28,7 @@ def data():
 @functools.cache
 def assembled(name):
     """(dna, parts, body) of one of the cast, as a face of shapes without hair."""
-    return build.assemble(data(), lambda _: None, people.PEOPLE[name])
+    return blend_shape_face.assemble(data(), lambda _: None, people.PEOPLE[name])
 
 
 def body(name):

@@ -20,6 +20,7 @@ from risorius.author.geometry import rigid
 from risorius.cli import main
 from risorius.controls.arkit import mapping, shares
 from risorius.sample import (
+    blend_shape_face,
     build,
     expressions,
     people,
@@ -105,7 +106,7 @@ def test_a_rigid_motion_is_found_again():
     found, shift = rigid.rigid_fit(points, points @ rotation.T + [1, 2, 3])
     np.testing.assert_allclose(found, rotation, atol=1e-12)
     np.testing.assert_allclose(shift, [1, 2, 3], atol=1e-12)
-    np.testing.assert_allclose(build.euler_xyz(found), [20, -10, 5], atol=1e-9)
+    np.testing.assert_allclose(blend_shape_face.euler_xyz(found), [20, -10, 5], atol=1e-9)
     third = rigid.part_rotation(found, 1 / 3)
     np.testing.assert_allclose(third @ third @ third, found, atol=1e-12)
 
@@ -238,7 +239,7 @@ def test_extra_each_row_of_the_mapping_gives_back_its_unit(sample, lod):
             raw[names.index(name)] = weight
         wanted = _wanted(data, body, unit, row)
         for index in dna.lod_mesh_mapping[lod]:
-            expected = parts[index].carry(positions + wanted) * build.CM
+            expected = parts[index].carry(positions + wanted) * blend_shape_face.CM
             error = np.linalg.norm(skinned(dna, rig, raw, index, lod) - expected, axis=1).max()
             worst[unit] = max(worst.get(unit, 0), float(error))
     bad = {unit: error / height for unit, error in worst.items() if error > 0.001 * height}
@@ -326,7 +327,7 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
             number = dna.mesh_names.index(part.name)
             # At rest its sides differ, which its joints know nothing of: what counts is the way.
             rest = np.asarray(dna.meshes[number].positions, float)
-            goal = rest + part.carry(wanted) * build.CM
+            goal = rest + part.carry(wanted) * blend_shape_face.CM
             lod = 1 if "_lod1_" in part.name else 0
             error = np.linalg.norm(skinned(dna, rig, raw, number, lod) - goal, axis=1).max()
             worst[unit] = max(worst.get(unit, 0.0), float(error))

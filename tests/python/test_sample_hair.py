@@ -12,7 +12,7 @@ from risorius.author.geometry.polygon_mesh import polygon_mesh
 from risorius.files.png import png, read_png
 from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
-from risorius.sample import build, people
+from risorius.sample import blend_shape_face, people
 from risorius.sample.hair import add_hair, grow_hair, hair_metadata, hair_picture
 from risorius.sample.hair.binding import Turning, append_mesh, corners_of
 from risorius.sample.hair.clearance import cut_clear, narrow_edges
@@ -319,7 +319,7 @@ def haired():
     out = []
     for person in (man, replace(man, name="Other", hair_style="bun", beard_style="short")):
         face = risorius.load(dna.to_bytes())
-        hair = grow_hair(person, body, body.man.positions, base, parts, build.CM)
+        hair = grow_hair(person, body, body.man.positions, base, parts, blend_shape_face.CM)
         add_hair(face, hair)
         out.append((face, hair, person))
     return out
@@ -333,7 +333,7 @@ def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
     lowest, before = [], []
     for share in (0.0, 0.5, 1.0):
         person = replace(people.PEOPLE["man"], hair_style="long", hair_fringe=share)
-        strips = grow_hair(person, body, even, base, parts, build.CM).strips["hair"]
+        strips = grow_hair(person, body, even, base, parts, blend_shape_face.CM).strips["hair"]
         ends = strips.points[:, -1] - [0, *eye[1:]]
         front = (np.abs(ends[:, 0]) < 0.35) & (ends[:, 2] > 0.2)
         before.append(int(front.sum()))

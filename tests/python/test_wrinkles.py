@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import risorius
 from risorius.author.levels import extend_levels
-from risorius.sample import build, expressions, people, wrinkles
+from risorius.sample import blend_shape_face, build, expressions, people, wrinkles
 from risorius.sample.expressions import Expression
 from risorius.sample.paint import textures
 from risorius.sample.part import Part
@@ -129,13 +129,15 @@ def test_the_add_on_knows_each_map_and_its_mask():
 
 def test_coarse_levels_have_no_wrinkles():
     dna = risorius.Dna()
-    names = [*build.FLUSH, *wrinkles.map_names()]
+    names = [*blend_shape_face.FLUSH, *wrinkles.map_names()]
     dna.lod_count = 2
     dna.raw_control_names = ["CTRL_expressions.a"]
     dna.animated_map_names = names
     dna.lod_animated_map_mapping = [range(len(names))] * 2
     rows = [(0, output, 0, 1, 1, 0) for output in range(len(names))]
-    maps = risorius.AnimatedMaps(lods=[len(rows)] * 2, conditionals=build.conditionals(rows))
+    maps = risorius.AnimatedMaps(
+        lods=[len(rows)] * 2, conditionals=blend_shape_face.conditionals(rows)
+    )
     dna.animated_maps = maps
     extend_levels(dna, 8)
     build.leave_maps(dna)

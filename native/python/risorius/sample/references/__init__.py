@@ -9,11 +9,11 @@ import contextlib
 import hashlib
 from pathlib import Path
 
-from ..author import Reference, RigOptions
-from ..author.reference import fingerprint
-from ..base.errors import ArgumentError
-from ..files import fileio
-from .source import SHA256, downloads
+from ...author import Reference, RigOptions
+from ...author.reference import fingerprint
+from ...base.errors import ArgumentError
+from ...files import fileio
+from ..source import SHA256, downloads
 
 SHIPPED = Path(__file__).with_name("joints.npz")
 
