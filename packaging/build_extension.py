@@ -3,9 +3,10 @@
 
     python packaging/build_extension.py --wheels WHEEL [WHEEL ...] --out FOLDER [--sample FOLDER]
 
-Prints the path of the zip. The wheels' version must equal the add-on's. The pure wheels that
-extension_wheels.txt pins are fetched with pip, their hashes checked, and kept in OUT/pure. Equal
-files make an equal zip, whenever it is made.
+Prints the path of the zip. The wheels' version must equal the add-on's. The wheel of the sample
+people is taken from beside the first wheel. The pure wheels that extension_wheels.txt pins are
+fetched with pip, their hashes checked, and kept in OUT/pure. Equal files make an equal zip,
+whenever it is made.
 """
 
 from __future__ import annotations
@@ -76,6 +77,22 @@ def fetch_pinned(folder: Path) -> list[Path]:
     names = re.findall(r"^([\w-]+)==([\w.]+)", PINNED.read_text(encoding="utf-8"), re.MULTILINE)
     found = (folder.glob(f"{name.replace('-', '_')}-{version}-*.whl") for name, version in names)
     return [wheel for wheels in found for wheel in wheels]
+
+
+def people_wheel(wheels: list[Path]) -> Path:
+    """The wheel of the sample people that lies beside wheels of ours.
+
+    Args:
+        wheels: of ours, all of one version.
+
+    Raises:
+        SystemExit: it is not there.
+    """
+    version = wheels[0].name.split("-")[1]
+    found = wheels[0].with_name(f"risorius_people-{version}-py3-none-any.whl")
+    if not found.is_file():
+        raise SystemExit(f"{found} was expected: build it with build_people_wheel of setup.sh")
+    return found
 
 
 def copy_sample(sample: Path, target: Path) -> None:
@@ -164,7 +181,8 @@ def main() -> int:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--sample", type=Path, help="folder with the sample face")
     args = parser.parse_args()
-    print(build(args.wheels, args.out, fetch_pinned(args.out / "pure"), args.sample))
+    pure = [people_wheel(args.wheels), *fetch_pinned(args.out / "pure")]
+    print(build(args.wheels, args.out, pure, args.sample))
     return 0
 
 

@@ -36,9 +36,9 @@ rm -rf "$out/data" "$out/native_counts" "$out/quick"
 mkdir -p "$out/data" "$out/native_counts" "$out/quick"
 # The package as it lies in the tree: with the module that counts, and with the wheel's for Blender, which
 # ends without a word (os._exit), so that native lines could not be counted in it.
-cp -r native/python/risorius "$out/native_counts/"
+cp -r native/python/risorius native/python/risorius_people "$out/native_counts/"
 cp "$(find "$out/native" -name '_native*.so')" "$out/native_counts/risorius/"
-cp -r native/python/risorius "$out/quick/"
+cp -r native/python/risorius native/python/risorius_people "$out/quick/"
 cp "$venv"/lib/python*/site-packages/risorius/_native*.so "$out/quick/risorius/"
 step "GoogleTest"
 timeout 3600 ctest --preset coverage -j"$(nproc)" -E "$changed_bytes" > "$out/ctest.log" || tail -n 20 "$out/ctest.log"

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 from risorius.author import find_reference
 from risorius.files import fileio
-from risorius.sample.blend_shape_face import assemble
-from risorius.sample.build import RIG, WEIGHTS
-from risorius.sample.references import SHIPPED
-from risorius.sample.source import Source, fetch
+from risorius_people.blend_shape_face import assemble
+from risorius_people.build import RIG, WEIGHTS
+from risorius_people.references import SHIPPED
+from risorius_people.source import Source, fetch
 
 
 def main() -> None:
-    """Write native/python/risorius/sample/references/joints.npz."""
+    """Write native/python/risorius_people/references/joints.npz."""
     man, _, _ = assemble(Source(fetch(offline=False)), print)
     reference = find_reference(man, RIG)
     for name, rows in reference.weights.items():
@@ -26,8 +26,8 @@ def main() -> None:
         even = np.round(rows * WEIGHTS)
         even[np.arange(len(even)), even.argmax(axis=1)] += WEIGHTS - even.sum(axis=1)
         reference.weights[name] = even / WEIGHTS
-    package = Path(__file__).parents[1] / "native" / "python" / "risorius"
-    path = package / "sample" / "references" / SHIPPED.name
+    package = Path(__file__).parents[1] / "native" / "python" / "risorius_people"
+    path = package / "references" / SHIPPED.name
     fileio.write_bytes(path, reference.to_bytes())
     print(f"{path}: {path.stat().st_size} bytes")
 

@@ -6,6 +6,8 @@
 # lie in build/release/VERSION; nothing is uploaded and nothing signed. Needs the sample's data (48 MB,
 # once).
 #
+#   RISORIUS_PEOPLE="man woman ..." adds these sample people, each as a zip of its own
+#
 #   RISORIUS_SITE=https://... is the address of the documentation, for Blender's Online Manual
 #   release.sh VERSION [--trial]   --trial: also of a tree that could not be released; says why not, and
 #                                  takes the wheels that there are
@@ -44,11 +46,17 @@ compgen -G "$project/build/dist/risorius-$version-cp311-*.whl" > /dev/null || bu
 gather_wheels
 step "sample face" # made by what is released: the venv may hold a wheel of another day
 released=$(printf '%s\n' "${wheels[@]}" | grep -- '-cp311-cp311-.*linux.*x86_64' | head -n 1)
-"$python" -m pip install -q --no-deps --force-reinstall "$released"
+build_people_wheel "$(dirname "$released")"
+people=("$(dirname "$released")/risorius_people-$version"-*.whl)
+"$python" -m pip install -q --no-deps --force-reinstall "$released" "${people[@]}"
 sample=$(sample_face)
 step "extensions and their repository"
 rm -rf "$out" && mkdir -p "$out"
-cp "${wheels[@]}" "${sdist[@]}" "$out"
+cp "${wheels[@]}" "${people[@]}" "${sdist[@]}" "$out"
+for person in ${RISORIUS_PEOPLE:-}; do
+  "$venv/bin/risorius" sample build "$out/$person/$person.dna" --person "$person"
+  (cd "$out" && "$python" -m zipfile -c "risorius-$person-$version.zip" "$person" && rm -r "$person")
+done
 mapfile -t zips < <("$python" $make zips "$out" --wheels "${wheels[@]}" --sample "$sample" \
   --website "${RISORIUS_SITE:-}")
 [ ${#zips[@]} -gt 1 ]

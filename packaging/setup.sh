@@ -113,16 +113,24 @@ bpy_venv() {
 build_wheel() {
   mkdir -p "$project/build/dist"
   rm -f "$project"/build/dist/risorius-*-cp311-*.whl
+  build_people_wheel "$project/build/dist"
   CMAKE_CXX_COMPILER_LAUNCHER=ccache "$python" -m pip wheel -q --no-build-isolation --no-deps \
     -C cmake.define.RISORIUS_BUILD_RIG_BENCH=ON -w "$project/build/dist" "$project"
-  "$python" -m pip install -q --no-deps --force-reinstall "$project"/build/dist/risorius-*-cp311-*.whl &&
+  "$python" -m pip install -q --no-deps --force-reinstall "$project"/build/dist/risorius-*-cp311-*.whl \
+    "$project"/build/dist/risorius_people-*.whl &&
     cp "$project"/build/wheel-cp311-*/tests/bench/rig_bench "$venv/bin/"
+}
+
+# build_people_wheel FOLDER: the wheel of the sample people, the same for every system
+build_people_wheel() {
+  rm -f "$1"/risorius_people-*.whl
+  "$python" -m pip wheel -q --no-build-isolation --no-deps -w "$1" "$project/native/python/risorius_people"
 }
 
 # sample_face: prints the folder of the face that each zip carries; made again when its code changed.
 sample_face() {
   local folder="$project/build/sample" code stamp
-  code=$(cat "$project"/native/python/risorius/{sample,author}/{,*/}*.{py,toml,npz} \
+  code=$(cat "$project"/native/python/{risorius_people,risorius/author}/{,*/}*.{py,toml,npz} \
     "$project"/native/author/*{,/*}.{h,cpp} 2>/dev/null | sha256sum | cut -c1-16)
   stamp="$folder/.$code"
   if [ ! -e "$stamp" ]; then

@@ -181,7 +181,7 @@ run_style() {
     "find native tests -name '*.h' -o -name '*.cpp' | xargs '$venv/bin/clang-format' --dry-run -Werror"
 }
 run_types() {
-  check "mypy of the package" "$venv/bin/mypy" --no-error-summary -p risorius
+  check "mypy of the package" "$venv/bin/mypy" --no-error-summary -p risorius -p risorius_people
   check "mypy of addon/logic" "$venv/bin/mypy" --no-error-summary --explicit-package-bases \
     --follow-imports=silent addon/risorius/logic
   check "pyright of the add-on" "$venv/bin/pyright"

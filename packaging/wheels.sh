@@ -194,7 +194,8 @@ linux_run() {
   shift
   if [ "$(cat "$folder/.wheel" 2> /dev/null)" != "$(sha256sum "$wheel")" ]; then
     rm -rf "$folder"
-    linux_pip "$version" --no-deps "numpy==${numpy_of[$version]}" "$wheel" || return 1
+    build_people_wheel "$wheels" &&
+      linux_pip "$version" --no-deps "numpy==${numpy_of[$version]}" "$wheel" "$wheels"/risorius_people-*.whl || return 1
     sha256sum "$wheel" > "$folder/.wheel"
   fi
   if [ -n "${suite_of[$version]:-}" ]; then

@@ -41,7 +41,8 @@ install() {
     printf '%s\n' 'import sys' 'import _winapi' 'sys.modules["_wmi"] = None' \
       'vars(_winapi).pop("CopyFile2", None)' > "$2/sitecustomize.py" && touch "$stamp"
   fi
-  rm -rf "$2"/risorius* && windows_pip "$1" "$2" --no-deps "$wheel"
+  build_people_wheel "$(dirname "$wheel")" &&
+    rm -rf "$2"/risorius* && windows_pip "$1" "$2" --no-deps "$wheel" "$(dirname "$wheel")"/risorius_people-*.whl
 }
 
 # wheel_is_new VERSION: it is there, and nothing that it is made of is younger
@@ -103,7 +104,8 @@ install_blender() { # install_blender SITE: Blender as a module for Windows, the
 windows_extension() { # of the Windows wheel alone; with the sample face if it is there
   local sample="$project/build/sample"
   [ -e "$sample/man.dna" ] || sample=
-  "$python" "$project/packaging/build_extension.py" --out "$windows/extension" ${sample:+--sample "$sample"} \
+  build_people_wheel "$project/build/wheels" &&
+    "$python" "$project/packaging/build_extension.py" --out "$windows/extension" ${sample:+--sample "$sample"} \
     --wheels "$project"/build/wheels/risorius-*-cp311-cp311-win_amd64.whl
 }
 blender_tests() {

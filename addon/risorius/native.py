@@ -142,15 +142,16 @@ def bundled_sample(person: str) -> Path | None:
 
 
 def sample_module() -> ModuleType:
-    """The module `risorius.sample`, loaded only when a sample is built.
+    """The package that makes sample people, loaded only when one is built.
 
     Raises:
-        UnusableError: the wheel is missing or of another version; the text says so.
+        UnusableError: a wheel is missing or of another version; the text says so.
     """
-    module()
-    from risorius import sample
-
-    return sample
+    finder = part("people")
+    try:
+        return finder.people()
+    except finder.NoPeopleError as error:
+        raise UnusableError(str(error)) from error
 
 
 def part(name: str) -> ModuleType:

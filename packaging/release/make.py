@@ -120,7 +120,10 @@ def make_zips(out: Path, wheels: list[Path], sample: Path | None, website: str =
     Raises:
         SystemExit: something does not fit together, or is larger than it may be.
     """
-    pure = build_extension.fetch_pinned(PROJECT / "build" / "dist" / "pure")
+    pure = [
+        build_extension.people_wheel(wheels),
+        *build_extension.fetch_pinned(PROJECT / "build" / "dist" / "pure"),
+    ]
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "risorius"

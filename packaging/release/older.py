@@ -33,7 +33,7 @@ def wheel_as(wheel: Path, old: str, new: str) -> Path:
         zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as out,
     ):
         for about in source.infolist():
-            name = about.filename.replace(f"risorius-{old}.dist-info", f"risorius-{new}.dist-info")
+            name = about.filename.replace(f"-{old}.dist-info", f"-{new}.dist-info")
             data = source.read(about)
             if name.endswith("dist-info/METADATA"):
                 data = data.replace(
@@ -69,10 +69,12 @@ def extension_as(package: Path, new: str, out: Path) -> Path:
         old = build_extension.manifest_version(text)
         text = re.sub(rf'^version = "{re.escape(old)}"', f'version = "{new}"', text, flags=re.M)
         manifest.write_text(
-            text.replace(f"/risorius-{old}-", f"/risorius-{new}-"), encoding="utf-8"
+            re.sub(rf"/(risorius(?:_people)?)-{re.escape(old)}-", rf"/\1-{new}-", text),
+            encoding="utf-8",
         )
-        for wheel in (root / "wheels").glob(f"risorius-{old}-*.whl"):
-            wheel_as(wheel, old, new)
+        for name in ("risorius", "risorius_people"):
+            for wheel in list((root / "wheels").glob(f"{name}-{old}-*.whl")):
+                wheel_as(wheel, old, new)
         target = out / package.name.replace(old, new)
         build_extension.write_zip(root, target)
     return target

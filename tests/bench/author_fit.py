@@ -19,7 +19,7 @@ import numpy as np
 from risorius.author import FitOptions, fit_joints
 from risorius.author.fitting import bounded
 from risorius.author.geometry.skeleton import matrices_of_vectors
-from risorius.sample.source import FACE_UNITS, Source, fetch
+from risorius_people.source import FACE_UNITS, Source, fetch
 
 HEAD_MM = 240
 

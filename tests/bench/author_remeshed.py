@@ -23,9 +23,9 @@ from risorius.author.input.obj import ObjMesh
 from risorius.author.input.shape_face import ShapeSet, check_shapes, make_shape_face
 from risorius.cli.author import as_lines
 from risorius.controls.arkit import mapping
-from risorius.sample import blend_shape_face
-from risorius.sample.people import MAN
-from risorius.sample.source import Source, fetch
+from risorius_people import blend_shape_face
+from risorius_people.people import MAN
+from risorius_people.source import Source, fetch
 
 
 def old_head(source):

@@ -10,6 +10,7 @@ from docstrings import public_functions, unsaid
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = [
     "native/python/risorius",
+    "native/python/risorius_people",
     "addon/risorius/logic",
     "addon/risorius/scene",
     "addon/risorius/ui",

@@ -8,7 +8,7 @@ import functools
 
 import pytest
 from conftest import _not_run
-from risorius.sample import blend_shape_face, people, source
+from risorius_people import blend_shape_face, people, source
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from risorius.controls import regions
-from risorius.sample import controls as sample_controls
+from risorius_people import controls as sample_controls
 from test_addon_logic import space  # noqa: F401  registers the package of the logic
 
 table_of: Any = importlib.import_module("risorius_addon_logic.character.board_table")

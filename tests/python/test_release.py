@@ -102,6 +102,7 @@ def made(make, tmp_path_factory):
     ]
     for wheel in wheels:
         wheel.write_bytes(wheel.name.encode())
+    (folder / f"risorius_people-{version}-py3-none-any.whl").write_bytes(b"people")
     face = folder / "face"
     face.mkdir()
     (face / "man.dna").write_bytes(b"a face")
@@ -128,7 +129,8 @@ def test_each_platform_has_its_wheels_and_the_face(made):
             manifest = tomllib.loads(package.read("blender_manifest.toml").decode())
         wheels = sorted(Path(n).name for n in inside if n.endswith(".whl"))
         label = next(tag for tag, its in PLATFORMS.items() if its == platform)
-        assert len(wheels) == 3
+        assert len(wheels) == 4
+        assert f"risorius_people-{version}-py3-none-any.whl" in wheels
         assert [label in name for name in wheels].count(True) == 2
         assert "sample/man.dna" in inside
         assert "sample/LICENSE.txt" in inside

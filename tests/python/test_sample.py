@@ -19,7 +19,7 @@ from risorius.author import Reference
 from risorius.author.geometry import rigid
 from risorius.cli import main
 from risorius.controls.arkit import mapping, shares
-from risorius.sample import (
+from risorius_people import (
     blend_shape_face,
     build,
     expressions,
@@ -29,7 +29,7 @@ from risorius.sample import (
     references,
     source,
 )
-from risorius.sample.paint import images, textures
+from risorius_people.paint import images, textures
 
 ARKIT = """browDownLeft browDownRight browInnerUp browOuterUpLeft browOuterUpRight cheekPuff
 cheekSquintLeft cheekSquintRight eyeBlinkLeft eyeBlinkRight eyeLookDownLeft eyeLookDownRight
@@ -488,7 +488,7 @@ def asked(monkeypatch):
         calls.append(options)
         return risorius.Dna()
 
-    monkeypatch.setattr("risorius.sample.build_sample", build_sample)
+    monkeypatch.setattr("risorius_people.build.build_sample", build_sample)
     return calls
 
 

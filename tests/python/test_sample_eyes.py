@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 import sample_people
 from risorius.author.geometry.polygon_mesh import vertex_normals
-from risorius.sample import people, polygons
-from risorius.sample.eyes import eye_parts, eyeball, lids, with_eyeballs
-from risorius.sample.eyes.rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
-from risorius.sample.paint import eyes as paint
+from risorius_people import people, polygons
+from risorius_people.eyes import eye_parts, eyeball, lids, with_eyeballs
+from risorius_people.eyes.rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
+from risorius_people.paint import eyes as paint
 
 MM = 0.01  # of the data's decimetres
 LIMBUS = 5.85  # mm from the gaze, where a cornea of 7.8 mm begins

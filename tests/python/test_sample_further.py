@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import sample_people
 from risorius.anim.reactions import load_reactions
-from risorius.sample.controls import gui_table
-from risorius.sample.further import CONTROLS_OF_CODE
+from risorius_people.controls import gui_table
+from risorius_people.further import CONTROLS_OF_CODE
 
 STANDARD = Path(__file__).parents[1] / "data" / "controls" / "standard_raw.txt"
 MM = 0.01  # of the data's decimetres

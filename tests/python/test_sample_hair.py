@@ -12,17 +12,17 @@ from risorius.author.geometry.polygon_mesh import polygon_mesh
 from risorius.files.png import png, read_png
 from risorius.mixing import Mix, difference, mix_faces
 from risorius.mixing.hair import hair_meshes
-from risorius.sample import blend_shape_face, people
-from risorius.sample.hair import add_hair, grow_hair, hair_metadata, hair_picture
-from risorius.sample.hair.binding import Turning, append_mesh, corners_of
-from risorius.sample.hair.clearance import cut_clear, narrow_edges
-from risorius.sample.hair.growth import curled, eased, grow
-from risorius.sample.hair.strips import card_faces, card_vertices, make_strips
-from risorius.sample.hair.surface import Roots, Surface, nearest_places
-from risorius.sample.paint.atlas import TILES
-from risorius.sample.paint.places import hairline_height
-from risorius.sample.paint.strands import paint_strands
-from risorius.sample.polygons import Polygons, subdivide
+from risorius_people import blend_shape_face, people
+from risorius_people.hair import add_hair, grow_hair, hair_metadata, hair_picture
+from risorius_people.hair.binding import Turning, append_mesh, corners_of
+from risorius_people.hair.clearance import cut_clear, narrow_edges
+from risorius_people.hair.growth import curled, eased, grow
+from risorius_people.hair.strips import card_faces, card_vertices, make_strips
+from risorius_people.hair.surface import Roots, Surface, nearest_places
+from risorius_people.paint.atlas import TILES
+from risorius_people.paint.places import hairline_height
+from risorius_people.paint.strands import paint_strands
+from risorius_people.polygons import Polygons, subdivide
 
 CUBE = Polygons(
     faces=[[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],

@@ -6,11 +6,11 @@ import pytest
 import sample_people
 from risorius.author.geometry import rigid
 from risorius.author.geometry.polygon_mesh import polygon_mesh
-from risorius.sample import askew, build, people, proportions, source
-from risorius.sample.eyes import with_eyeballs
-from risorius.sample.paint.layout import islands
-from risorius.sample.parts import clothes, lips, teeth
-from risorius.sample.polygons import edges_of
+from risorius_people import askew, build, people, proportions, source
+from risorius_people.eyes import with_eyeballs
+from risorius_people.paint.layout import islands
+from risorius_people.parts import clothes, lips, teeth
+from risorius_people.polygons import edges_of
 
 MM = 0.01  # of the data's decimetres
 

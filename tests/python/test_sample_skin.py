@@ -5,10 +5,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from risorius.sample import people
-from risorius.sample.paint import form, layout, patterns, raster, regions, relief, skin
-from risorius.sample.part import Part
-from risorius.sample.polygons import Polygons
+from risorius_people import people
+from risorius_people.paint import form, layout, patterns, raster, regions, relief, skin
+from risorius_people.part import Part
+from risorius_people.polygons import Polygons
 
 SIDE = 33
 

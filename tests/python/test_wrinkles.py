@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import risorius
 from risorius.author.levels import extend_levels
-from risorius.sample import blend_shape_face, build, expressions, people, wrinkles
-from risorius.sample.expressions import Expression
-from risorius.sample.paint import textures
-from risorius.sample.part import Part
-from risorius.sample.polygons import Polygons
+from risorius_people import blend_shape_face, build, expressions, people, wrinkles
+from risorius_people.expressions import Expression
+from risorius_people.paint import textures
+from risorius_people.part import Part
+from risorius_people.polygons import Polygons
 
 _LOGIC = Path(__file__).parents[2] / "addon" / "risorius" / "logic" / "material"
 SIDE = 20

@@ -1,0 +1,365 @@
+# SPDX-License-Identifier: MIT
+"""A sample person as a face of blend shapes: meshes, skeleton, controls, correctives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from risorius import (
+    AnimatedMaps,
+    BlendShapeChannels,
+    BlendShapeTarget,
+    Conditionals,
+    Dna,
+    JointGroup,
+    Mesh,
+    Psds,
+)
+from risorius.author.geometry.polygon_mesh import polygon_mesh, vertex_normals
+
+from . import expressions as ex
+from . import wrinkles
+from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
+from .controls import gui_table
+from .eyes import eye_parts, with_eyeballs
+from .paint.layout import packed
+from .part import Part
+from .parts.clothes import shirt
+from .parts.teeth import mouth_parts
+from .people import MAN, Person
+from .polygons import (
+    Floats,
+    Ints,
+    Polygons,
+    clip_below,
+    compact_uvs,
+    subdivide,
+)
+from .source import BaseMesh, Source
+
+CM = 10.0  # the data are in decimetres
+FLUSH = ("head_flush_L", "head_flush_R")
+PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
+    "head": (["body"], 1, 0),
+    "tongue": (["helper-tongue"], 1, 0),
+}
+
+
+def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
+    """Every mesh at both LODs.
+
+    Args:
+        base: the base mesh with its eyeballs.
+        groups: vertex indices by group.
+    """
+    count = len(base.positions)
+    out = []
+    for lod in (0, 1):
+        for name, (own, *levels) in PARTS.items():
+            corners = [
+                face
+                for group in own
+                for face in base.faces[group]
+                if abs(base.positions[face[0][0], 0]) < REACH
+            ]
+            polygons = Polygons(
+                [[c[0] for c in face] for face in corners],
+                [[c[1] for c in face] for face in corners],
+                base.uvs,
+                count,
+            )
+            # Clipping at the neck drops the body below it; the small parts all lie above.
+            aside = np.hypot(base.positions[:, 0], 0.35)  # round in front, no point
+            height = base.positions[:, 1] - NECK_SLOPE * aside
+            polygons, operator = clip_below(polygons, height, NECK_CUT)
+            if name == "head":
+                polygons.uvs = packed(polygons)
+            part = Part(f"{name}_lod{lod}_mesh", compact_uvs(polygons), [operator])
+            for _ in range(levels[lod]):
+                part.polygons, operator = subdivide(part.polygons)
+                part.operators.append(operator)
+            out.append(part)
+        out += mouth_parts(base, lod)
+        out.append(shirt(base, lod))
+        out += eye_parts(base, groups, lod)
+    return out
+
+
+def bind_displacement(
+    positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
+) -> Floats:
+    """What the blend shape has to add before skinning, so that both give the whole motion.
+
+    Args:
+        positions: float64[v, 3], decimetres.
+        weights: float64[v, 9], skin weights.
+        expression: displacements of the same vertices, and what its joints do.
+        joints: positions of the joints by name.
+
+    Returns:
+        float64[v, 3], decimetres.
+    """
+    if not expression.joints:
+        return expression.displacement
+    matrices = np.tile(np.eye(3), (len(positions), 1, 1))
+    offsets = np.zeros_like(positions)
+    for name, (rotation, shift) in expression.joints.items():
+        w = weights[:, [k for k, (own, above) in enumerate(JOINTS) if name in (own, above)]]
+        w = w.sum(axis=1)  # a joint takes along what hangs on it
+        matrices += w[:, None, None] * (rotation - np.eye(3))
+        offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
+    wanted: Floats = positions + expression.displacement - offsets
+    return np.linalg.solve(matrices, wanted[:, :, None])[:, :, 0] - positions
+
+
+def euler_xyz(rotation: Floats) -> Floats:
+    """Degrees about x, y, z of a column-vector matrix Rz Ry Rx."""
+    return np.degrees(
+        [
+            np.arctan2(rotation[2, 1], rotation[2, 2]),
+            -np.arcsin(np.clip(rotation[2, 0], -1, 1)),
+            np.arctan2(rotation[1, 0], rotation[0, 0]),
+        ]
+    )
+
+
+def add_skin(mesh: Mesh, weights: Floats) -> None:
+    """Give a mesh its skin weights; those of a thousandth or less are left out.
+
+    Args:
+        mesh: gets them.
+        weights: float64[v, 9].
+    """
+    kept = np.where(weights > 1e-3, weights, 0)
+    kept /= kept.sum(axis=1, keepdims=True)
+    vertex, joint = np.nonzero(kept)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum((kept > 0).sum(axis=1))])
+    mesh.skin_weights = kept[vertex, joint]
+    mesh.skin_joint_indices = joint
+    mesh.maximum_influence_per_vertex = int((kept > 0).sum(axis=1).max())
+
+
+def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
+    """Geometry and skin of a part, in centimetres.
+
+    Args:
+        part: of the base mesh.
+        positions: float64[V, 3], all vertices of the base mesh, decimetres.
+        weights: float64[v, 9], skin weights of the part's own vertices.
+    """
+    p = part.carry(positions)
+    polygons = part.polygons
+    uvs, uv_faces = polygons.uvs, polygons.uv_faces
+    normals = vertex_normals(p, polygons.faces)
+    mesh = polygon_mesh(p * CM, normals, polygons.faces, uvs, uv_faces)
+    add_skin(mesh, weights)
+    return mesh
+
+
+def add_definition(
+    dna: Dna,
+    person: Person,
+    parts: list[Part],
+    joints: dict[str, Floats],
+    raw: list[str],
+    channels: list[str],
+) -> None:
+    """Fill the descriptor and the definition: names, the skeleton, what each LOD lists.
+
+    Args:
+        dna: is filled.
+        person: name, gender.
+        parts: the meshes, those of LOD 0 first.
+        joints: positions of the joints by name, decimetres.
+        raw: names of the raw controls without their prefix.
+        channels: names of the blend shape channels.
+    """
+    names = [name for name, _ in JOINTS]
+    dna.name = person.name
+    dna.archetype, dna.gender, dna.age = "other", person.gender, person.age
+    dna.coordinate_system = ("right", "up", "front")
+    dna.lod_count = 2
+    dna.complexity, dna.db_name = "sample", "risorius"
+    dna.joint_names = names
+    dna.joint_parents = [names.index(parent) if parent else 0 for _, parent in JOINTS]
+    world = np.array([joints[name] for name in names]) * CM
+    local = world - np.where(
+        np.arange(len(names))[:, None] == 0, 0, world[np.asarray(dna.joint_parents)]
+    )
+    dna.neutral_joint_translations = local
+    dna.neutral_joint_rotations = np.zeros_like(local)
+    dna.raw_control_names = [ex.PREFIX + name for name in raw]
+    dna.blend_shape_channel_names = channels
+    dna.animated_map_names = [*FLUSH, *wrinkles.map_names()]
+    dna.mesh_names = [part.name for part in parts]
+    half = len(parts) // 2
+    dna.lod_mesh_mapping = [range(half), range(half, len(parts))]
+    dna.lod_joint_mapping = [range(len(names))] * 2
+    dna.lod_blend_shape_mapping = [range(len(channels))] * 2
+    dna.lod_animated_map_mapping = [range(len(dna.animated_map_names))] * 2
+
+
+def add_gui(dna: Dna, raw: list[str]) -> None:
+    """Fill the GUI controls and the table that turns them into raw controls.
+
+    Args:
+        dna: is filled.
+        raw: names of the raw controls without their prefix.
+    """
+    table = gui_table()
+    dna.gui_control_names = [gui for gui, _ in table]
+    rows = [
+        (g, raw.index(name), *where) for g, (_, leads) in enumerate(table) for name, where in leads
+    ]
+    dna.gui_to_raw = conditionals(rows)
+
+
+def conditionals(rows: Sequence[tuple[int, int, float, float, float, float]]) -> Conditionals:
+    columns = list(zip(*rows, strict=True))
+    return Conditionals(
+        input_indices=columns[0],
+        output_indices=columns[1],
+        from_values=np.array(columns[2], np.float32),
+        to_values=np.array(columns[3], np.float32),
+        slope_values=np.array(columns[4], np.float32),
+        cut_values=np.array(columns[5], np.float32),
+    )
+
+
+def add_behavior(
+    dna: Dna,
+    raw: list[str],
+    units: dict[str, ex.Expression],
+    correctives: list[tuple[str, ...]],
+) -> None:
+    """Fill the correctives, joint groups, blend shape channels and animated maps.
+
+    Args:
+        dna: is filled.
+        raw: names of the raw controls without their prefix.
+        units: what each raw control does, by its name.
+        correctives: the raw controls of each corrective.
+    """
+    names = [name for name, _ in JOINTS]
+    dna.psd_count = len(correctives)
+    dna.psds = Psds(
+        rows=[len(raw) + i for i, names in enumerate(correctives) for _ in names],
+        columns=[raw.index(name) for names in correctives for name in names],
+        values=np.ones(sum(map(len, correctives)), np.float32),
+    )
+    groups = []
+    for joint in (name for name in names if name.startswith("FACIAL_")):
+        inputs = [name for name in raw if joint in units[name].joints]
+        values = np.zeros((6, len(inputs)), np.float32)
+        for column, name in enumerate(inputs):
+            rotation, shift = units[name].joints[joint]
+            values[:3, column] = shift * CM
+            values[3:, column] = euler_xyz(rotation)
+        used = np.flatnonzero(np.abs(values).max(axis=1) > 1e-4)
+        index = names.index(joint)
+        groups.append(
+            JointGroup(
+                lods=[len(used)] * 2,
+                input_indices=[raw.index(name) for name in inputs],
+                output_indices=index * 9 + used,
+                values=values[used],
+                joint_indices=[index],
+            )
+        )
+    dna.joint_groups = groups
+    dna.joint_row_count = 9 * len(names)
+    dna.joint_column_count = len(raw) + len(correctives)
+    count = len(raw) + len(correctives)
+    dna.blend_shape_channels = BlendShapeChannels(
+        lods=[count] * 2, input_indices=range(count), output_indices=range(count)
+    )
+    maps = []
+    for output, side in enumerate("LR"):
+        for name, slope in (
+            ("mouthCornerPull", 0.25),
+            ("eyeCheekRaise", 0.2),
+            ("mouthCheekBlow", 0.35),
+        ):
+            maps.append((raw.index(name + side), output, 0, 1, slope, 0))
+        maps.append((raw.index("jawOpenExtreme"), output, 0, 1, 0.35, 0))
+    for name, number, slope in wrinkles.drivers():
+        maps.append((raw.index(name), len(FLUSH) + number, 0, 1, slope, 0))
+    dna.animated_maps = AnimatedMaps(lods=[len(maps)] * 2, conditionals=conditionals(maps))
+
+
+def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
+    """One target per channel that moves a vertex by more than a hundredth of a millimetre.
+
+    Args:
+        mesh: gets them.
+        deltas: float64[v, 3] of each channel, decimetres.
+    """
+    targets = []
+    for channel, delta in enumerate(deltas):
+        moved = np.flatnonzero(np.abs(delta).max(axis=1) > 1e-4)
+        if len(moved):
+            targets.append(
+                BlendShapeTarget(
+                    deltas=delta[moved] * CM,
+                    vertex_indices=moved,
+                    blend_shape_channel_index=channel,
+                )
+            )
+    mesh.blend_shape_targets = targets
+
+
+def assemble(
+    source: Source, say: Callable[[str], None], person: Person = MAN
+) -> tuple[Dna, list[Part], Body]:
+    """The whole Dna, its parts, and the person that they are of.
+
+    Args:
+        source: the data that it is made from.
+        say: is told what is being done, a sentence at a time.
+        person: whom to make.
+    """
+    base = with_eyeballs(source.base_mesh())
+    say("reading 52 ARKit units and the further ones")
+    body = Body(source, base, person)
+    positions, joints, units = body.positions, body.joints, body.units
+    places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]
+    correctives: dict[tuple[str, ...], Floats] = {}
+    for found in (ex.corrective_displacements(units, places), body.closing, body.eye_correctives):
+        correctives |= {tuple(pair): way for pair, way in found.items()}
+    # It adds no shape: the turns of the joints of its factors do not add up, and it mends that.
+    correctives[ex.CLOSED] = np.zeros_like(positions)
+    raw = list(units)
+    pairs = list(correctives)
+    channels = raw + ["_x_".join(pair) for pair in pairs]
+    say(f"{len(raw)} raw controls, {len(pairs)} correctives; meshes and LODs")
+    parts = make_parts(base, body.groups)
+    weights = body.weights
+    dna = Dna()
+    add_definition(dna, person, parts, joints, raw, channels)
+    add_gui(dna, raw)
+    add_behavior(dna, raw, units, pairs)
+    meshes, mapping = [], []
+    for number, part in enumerate(parts):
+        p, w = part.carry(positions), part.carry(weights)
+        mesh = make_mesh(part, positions, w)
+        if not part.rests:
+            deltas = []
+            for name, unit in units.items():
+                whole = unit.displacement - correctives.get((name, name), 0.0)
+                here = ex.Expression(part.carry(whole), unit.joints)
+                deltas.append(bind_displacement(p, w, here, joints))
+            jaw = raw.index("jawOpen")
+            for pair, way in correctives.items():
+                delta = part.carry(way)
+                if pair in body.closing:  # a way in space, not one that the open jaw turns
+                    open_jaw = units["jawOpen"]
+                    both = ex.Expression(part.carry(open_jaw.displacement) + delta, open_jaw.joints)
+                    delta = bind_displacement(p, w, both, joints) - deltas[jaw]
+                deltas.append(delta)
+            add_targets(mesh, deltas)
+        mapping += [(number, t.blend_shape_channel_index) for t in mesh.blend_shape_targets]
+        meshes.append(mesh)
+    dna.meshes = meshes
+    dna.mesh_blend_shape_channel_mapping = np.array(mapping)
+    return dna, parts, body

@@ -1,0 +1,298 @@
+# SPDX-License-Identifier: MIT
+"""A person before there are meshes: where all is, what hangs on what, and what expressions do."""
+
+from __future__ import annotations
+
+from copy import copy
+
+import numpy as np
+from risorius.author.geometry.rigid import rigid_way
+from risorius.base.easing import smooth_step
+
+from . import expressions as ex
+from .eyes import Eyes, with_eyeballs
+from .parts.clothes import collar_heights
+from .parts.lips import Mouth, sealed
+from .people import MAN, Person
+from .polygons import Floats, Ints
+from .proportions import Proportions
+from .source import TARGETS, BaseMesh, Source
+
+FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
+NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+NECK_SLOPE = 0.35
+TEETH_SHOW = 0.035
+# Above the collar's seam: skin in the shirt rests or it would come through, then it is free.
+COVERED = (0.06, 0.4)
+REACH = 1.3  # the hands are as high as the neck, but not as near
+# name, parent, group of the base mesh whose middle is the joint (or None: set below)
+JOINTS = [
+    ("spine_04", None),
+    ("neck_01", "spine_04"),
+    ("neck_02", "neck_01"),
+    ("head", "neck_02"),
+    ("FACIAL_C_Jaw", "head"),
+    ("FACIAL_L_Eye", "head"),
+    ("FACIAL_R_Eye", "head"),
+    ("FACIAL_C_TeethUpper", "head"),
+    ("FACIAL_C_TeethLower", "FACIAL_C_Jaw"),
+]
+
+
+def group_indices(base: BaseMesh) -> dict[str, Ints]:
+    return {
+        name: np.unique([corner[0] for face in faces for corner in face])
+        for name, faces in base.faces.items()
+        if faces
+    }
+
+
+def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
+    """float64[V, 3]: the positions of the base mesh as the person's, decimetres.
+
+    Args:
+        source: has the shapes that the person is mixed of.
+        base: the base mesh.
+        person: names the shapes and how much of each.
+    """
+    count = len(base.positions)
+    out = base.positions.copy()
+    for name, weight in person.shape().items():
+        out += weight * source.target(f"{TARGETS}{name}.target.gz", count)
+    for name, weight in person.features.items():
+        out += weight * source.feature(name, count)
+    return out
+
+
+def head_size(base: BaseMesh, positions: Floats) -> float:
+    """How far the vertices above the neck lie from their middle, decimetres (root mean square).
+
+    Args:
+        base: the base mesh, whose neck tells which they are.
+        positions: float64[V, 3] of a person.
+    """
+    above = np.abs(base.positions[:, 0]) < REACH
+    above &= base.positions[:, 1] > NECK_CUT + 0.5
+    held = positions[above]
+    return float(np.sqrt(((held - held.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def show_upper_teeth(
+    positions: Floats, groups: dict[str, Ints], jaw_open: Floats, size: float
+) -> None:
+    """Lower the upper teeth until some millimetres show below the lip of an open mouth.
+
+    Args:
+        positions: float64[V, 3], decimetres; those of the teeth are changed in place.
+        groups: vertex indices by group of the base mesh.
+        jaw_open: float64[V, 3], displacement of the unit jawOpen: what it leaves is upper lip.
+        size: of the head, 1 that of the man.
+    """
+    upper = groups["helper-upper-teeth"]
+    body = positions[groups["body"]]
+    still = np.linalg.norm(jaw_open[groups["body"]], axis=1) < 0.03 * size
+    front = positions[upper][:, 2].max() - 0.05 * size
+    lip = body[still & (np.abs(body[:, 0]) < 0.05 * size) & (body[:, 2] > front)]
+    edge = positions[upper][:, 1].min()
+    below_nose = lip[(lip[:, 1] > edge - 0.15 * size) & (lip[:, 1] < edge + 0.25 * size)]
+    positions[upper, 1] += min(0.0, below_nose[:, 1].min() - TEETH_SHOW * size - edge)
+
+
+def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> dict[str, Floats]:
+    """World positions float64[3] of the joints by name, in decimetres.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        groups: vertex indices by group of the base mesh.
+        size: of the head, 1 that of the man.
+    """
+
+    def middle(group: str) -> Floats:
+        return np.asarray(positions[groups[group]].mean(axis=0))
+
+    neck, head = middle("joint-neck"), middle("joint-head")
+    eyes = {s: middle(f"helper-{s.lower()}-eye") for s in "LR"}
+    jaw_hinge = np.array([0, eyes["L"][1] * 0.62 + head[1] * 0.38, head[2] + 0.35 * size])
+    return {
+        "spine_04": neck + size * np.array([0, -0.55, -0.15]),
+        "neck_01": neck,
+        "neck_02": (neck + head) / 2,
+        "head": head,
+        "FACIAL_C_Jaw": jaw_hinge,
+        "FACIAL_L_Eye": eyes["L"],
+        "FACIAL_R_Eye": eyes["R"],
+        "FACIAL_C_TeethUpper": middle("helper-upper-teeth"),
+        "FACIAL_C_TeethLower": middle("helper-lower-teeth"),
+    }
+
+
+def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
+    """Weights [V, 9] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        joints: positions of the joints by name.
+    """
+    # Chin and nose are as high as the neck and lie in front of it; they belong to the head.
+    ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
+    height = positions[:, 1] + 0.8 * ahead
+    levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
+    middles = [levels[0] + 0.15, levels[1] + 0.1, levels[2] - 0.1, levels[3] - 0.35]
+    out = np.zeros((len(positions), len(JOINTS)))
+    rest = np.ones(len(positions))
+    for k in range(3):
+        up = smooth_step((height - middles[k]) / (middles[k + 1] - middles[k]))
+        out[:, k] = rest * (1 - up)
+        rest = rest * up
+    out[:, 3] = rest
+    return out
+
+
+def skin_weights(
+    positions: Floats,
+    groups: dict[str, Ints],
+    joints: dict[str, Floats],
+    jaw_open: ex.Expression,
+) -> Floats:
+    """Weights [V, 9] of the base mesh's vertices; rows sum to 1.
+
+    The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        groups: vertex indices by group of the base mesh.
+        joints: positions of the joints by name.
+        jaw_open: the unit jawOpen with the motion of its joint.
+    """
+    weights = spine_weights(positions, joints)
+    rigid = rigid_way(positions, joints["FACIAL_C_Jaw"], *jaw_open.joints["FACIAL_C_Jaw"])
+    length = np.einsum("ij,ij->i", rigid, rigid)
+    share = np.einsum("ij,ij->i", jaw_open.displacement, rigid) / np.maximum(length, 1e-9)
+    jaw = np.clip(share, 0, 1) * (length > 1e-6)
+    for group, value in (
+        ("helper-lower-teeth", 1),
+        ("helper-tongue", 1),
+        ("helper-upper-teeth", 0),
+    ):
+        jaw[groups[group]] = value
+    weights *= (1 - jaw)[:, None]
+    weights[:, 4] = jaw
+    for column, letter in ((5, "l"), (6, "r")):
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            weights[groups[name.format(letter)]] = np.eye(len(JOINTS))[column]
+    for column, group in ((7, "helper-upper-teeth"), (8, "helper-lower-teeth")):
+        weights[groups[group]] = np.eye(len(JOINTS))[column]
+    return weights
+
+
+class Body:
+    """A person before there are meshes: where all is, and what each raw control does.
+
+    All people have the man's skin weights and his units, these in their own proportions.
+
+    Attributes:
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        joints: positions of the joints by name.
+        units: what each raw control does.
+        closing: float64[V, 3], what closes lips that the jaw has opened, by their two raw controls.
+        eyes: where they are and how their lids rest.
+        eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
+        man: the man's, for the man himself this.
+        weights: float64[V, 9], skin weights.
+    """
+
+    def __init__(self, source: Source, base: BaseMesh, person: Person) -> None:
+        base = with_eyeballs(base)
+        self.groups = groups = group_indices(base)
+        man = person.shape() == MAN.shape() and person.features == MAN.features
+        other = None if man else Body(source, base, MAN)
+        self.positions = shaped(source, base, person)
+        self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
+        self.eyes = Eyes(base, groups, self.positions, person.age)
+        self._raw = self.positions.copy()  # as the data have them
+        self._ways: dict[str, Floats] = {}  # likewise, of the raw controls
+        self.man: Body = self
+        self._change: Proportions | None = None
+        size = 1.0
+        if other is not None:
+            self.man = other
+            size = head_size(base, self.positions) / head_size(base, other.positions)
+            self._change = Proportions(base, groups, other._raw, self._raw)
+        count = len(self.positions)
+        wide = {
+            side[0]: self.carried(source.face_unit(f"eyeWide{side}", count))
+            for side in ("Left", "Right")
+        }
+        self.eyes.open(self.positions, wide)
+        jaw_open = self.carried(source.face_unit("jawOpen", count))
+        pucker = self.carried(source.face_unit("mouthPucker", count))
+        self.positions = sealed(Mouth(base, pucker, jaw_open), self.positions)
+        show_upper_teeth(self.positions, groups, jaw_open, size)
+        self.joints = joint_positions(self.positions, groups, size)
+        if other is None:
+            self.units = ex.split_units(source, self.positions)
+            self.units |= ex.extra_units(source, self.positions, person.origin)
+            self.closing = ex.add_further_units(
+                self.units, source, base, groups, self.positions, person.origin
+            )
+            self.closing |= ex.take_closing(self.units)
+        else:
+            self.units = {
+                name: ex.Expression(self.carried(way)) for name, way in other._ways.items()
+            }
+            self.closing = self._carried_closing(other)
+        self._ways = {name: unit.displacement for name, unit in self.units.items()}
+        moved = dict(self._ways)
+        self.eye_correctives = self.eyes.move(moved)
+        rests, free = COVERED
+        above = (collar_heights(base.positions) - rests) / (free - rests)
+        held = np.ones((count, 1))
+        held[groups["body"]] = smooth_step(above[groups["body"]])[:, None]
+        for name, way in moved.items():  # breath is all there is to see at the pit of the throat
+            self.units[name].displacement = way if "neckThroat" in name else way * held
+        ex.add_joint_motion(self.units, groups, self.positions, self.joints)
+        ex.leave_bones(self.units, groups, self.positions, self.joints)
+        if other is None:
+            jaw = self.units["jawOpen"]
+            self.weights = skin_weights(self.positions, groups, self.joints, jaw)
+        else:
+            self.weights = other.weights
+
+    def carried(self, displacement: Floats) -> Floats:
+        """float64[V, 3]: a displacement of the data in this person's proportions.
+
+        Args:
+            displacement: float64[V, 3], decimetres.
+        """
+        return displacement if self._change is None else self._change.carried(displacement)
+
+    def _carried_closing(self, man: Body) -> dict[tuple[str, str], Floats]:
+        """Another's `closing` in this person's proportions.
+
+        It is carried with the jaw, whose turn both lips share: by itself each would miss the other.
+        The lips' quarters are parts of what is carried whole, since such parts do not add up.
+
+        Args:
+            man: whose they are.
+        """
+        jaw = man._ways["jawOpen"]
+        rest = self.carried(jaw)
+        out = {pair: self.carried(jaw + way) - rest for pair, way in man.closing.items()}
+        quarters = {pair: man.closing[pair] for pair in out if pair[1] in ex.LIPS_TOGETHER}
+        whole = np.sum(list(quarters.values()), axis=0)
+        length = np.maximum(np.einsum("vi,vi->v", whole, whole), 1e-12)
+        carried = self.carried(jaw + whole) - rest
+        for pair, way in quarters.items():
+            out[pair] = carried * (np.einsum("vi,vi->v", way, whole) / length)[:, None]
+        return out
+
+    def moved(self, shape: Floats) -> Body:
+        """The same person with other positions.
+
+        Args:
+            shape: float64[V, 3], what is added to them, decimetres.
+        """
+        out = copy(self)
+        out.positions = self.positions + shape
+        return out

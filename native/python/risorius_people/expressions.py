@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: MIT
+"""What each control of the sample does: displacements of all vertices, and joint motions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from risorius.author.geometry.rigid import about, part_rotation, rigid_fit, rigid_way
+from risorius.base.easing import smooth_step
+from risorius.controls.arkit import mapping
+
+from .folds import from_laugh_line
+from .further import find_places, further_units, unit_shape
+from .polygons import Floats, Ints
+from .source import BaseMesh, Source
+
+_CHEEK_BALL, _ROLL = 0.032, 0.022  # decimetres
+PREFIX = "CTRL_expressions."
+LIPS_TOGETHER = [f"mouthLipsTogether{lip}{side}" for lip in "UD" for side in "LR"]
+CLOSED = ("jawOpen", *LIPS_TOGETHER)
+_BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("down", "up")]
+
+
+@dataclass
+class Expression:
+    """One raw control at 1: where every vertex goes, and how much of it the joints do."""
+
+    displacement: Floats  # [V, 3] in decimetres: the whole motion
+    joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)  # rotation, translation
+
+
+def side_masks(positions: Floats) -> dict[str, Floats]:
+    """Left and right halves that sum to 1; the character's left is +x."""
+    left = smooth_step(positions[:, 0] / 0.5 + 0.5)
+    return {"L": left, "R": 1 - left}
+
+
+def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
+    """Upper and lower that sum to 1: what the opening jaw takes along is lower.
+
+    Space cannot tell the lips apart, they touch; the motion of the jaw can.
+    """
+    travel = np.linalg.norm(jaw_open, axis=1)
+    lower = smooth_step(travel / (0.55 * np.quantile(travel[travel > 0], 0.95)))
+    return {"U": 1 - lower, "D": lower}
+
+
+def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
+    """The 52 ARKit units, divided over the raw controls of their row in arkit.toml.
+
+    Args:
+        source: the data that the units come from.
+        positions: float64[V, 3], decimetres; they tell left from right.
+    """
+    count = len(positions)
+    sides = side_masks(positions)
+    lips = lip_masks(source.face_unit("jawOpen", count))
+    out: dict[str, Expression] = {}
+    for unit, row in mapping().items():
+        whole = source.face_unit(unit, count)
+        names = [name.removeprefix(PREFIX) for name in row]
+        for name in names:
+            mask = np.ones(count)
+            if len(names) > 1:
+                if {n[-1] for n in names} == {"L", "R"}:
+                    mask = mask * sides[name[-1]]
+                if {n[-2] for n in names} == {"U", "D"}:
+                    mask = mask * lips[name[-2]]
+            out[name] = Expression(whole * mask[:, None])
+    return out
+
+
+def extra_units(
+    source: Source, positions: Floats, origin: Mapping[str, float]
+) -> dict[str, Expression]:
+    """Controls beyond ARKit that the FACS-like targets of the data can show.
+
+    Args:
+        source: the data that they come from.
+        positions: float64[V, 3], decimetres; they tell left from right.
+        origin: shares of the data's origins, together 1.
+    """
+    sides = side_masks(positions)
+
+    def unit(name: str) -> Floats:
+        return unit_shape(source, origin, name, len(positions))
+
+    out = {}
+    halves = {
+        "neckStretch": unit("neck-platysma"),
+        "noseNostrilCompress": unit("nose-compression"),
+        "noseNostrilDepress": unit("nose-depression"),
+        "mouthLipsPress": unit("mouth-compression"),
+        "mouthSharpCornerPull": unit("mouth-corner-puller"),
+    }
+    for name, whole in halves.items():
+        for side, mask in sides.items():
+            out[name + side] = Expression(whole * mask[:, None])
+    out["noseNostrilDilateL"] = Expression(unit("nose-left-dilatation"))
+    out["noseNostrilDilateR"] = Expression(unit("nose-right-dilatation"))
+    out["mouthUp"] = Expression(unit("mouth-elevation"))
+    out["mouthDown"] = Expression(unit("mouth-depression"))
+    return out
+
+
+def add_further_units(
+    out: dict[str, Expression],
+    source: Source,
+    base: BaseMesh,
+    groups: dict[str, Ints],
+    positions: Floats,
+    origin: Mapping[str, float],
+) -> dict[tuple[str, str], Floats]:
+    """Give a face what its data do not show as units: all that further.toml has.
+
+    Args:
+        out: the expressions by name; the further ones are added.
+        source: the data.
+        base: the base mesh.
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        origin: shares of the data's origins, together 1.
+
+    Returns:
+        float64[V, 3] of its correctives by their two raw controls.
+    """
+    count = len(positions)
+    brows = sum(np.abs(unit_shape(source, origin, name, count)) for name in _BROWS)
+    jaw_open = out["jawOpen"].displacement
+    places = find_places(base, positions, groups, jaw_open, np.asarray(brows))
+    units = {name: unit.displacement for name, unit in out.items()}
+    further, correctives = further_units(source, origin, places, units, side_masks(positions))
+    for name, displacement in further.items():
+        out[name] = Expression(displacement)
+    return correctives
+
+
+def add_joint_motion(
+    out: dict[str, Expression],
+    groups: dict[str, Floats],
+    positions: Floats,
+    pivots: dict[str, Floats],
+) -> None:
+    """Give jaw, teeth and eyes their joints: the rigid motion that fits teeth and eyeballs best.
+
+    Args:
+        out: the expressions by name; gets jawBack and jawOpenExtreme too.
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        pivots: joint positions by name.
+    """
+    teeth = groups["helper-lower-teeth"]
+    jaw = pivots["FACIAL_C_Jaw"]
+    for name in ("jawOpen", "jawLeft", "jawRight", "jawFwd"):
+        moved = positions[teeth] + out[name].displacement[teeth]
+        out[name].joints["FACIAL_C_Jaw"] = about(jaw, *rigid_fit(positions[teeth], moved))
+    forward = out["jawFwd"].joints["FACIAL_C_Jaw"][1]
+    out["jawBack"] = Expression(
+        -0.4 * out["jawFwd"].displacement, {"FACIAL_C_Jaw": (np.eye(3), -0.4 * forward)}
+    )
+    rotation, shift = out["jawOpen"].joints["FACIAL_C_Jaw"]
+    out["jawOpenExtreme"] = Expression(
+        0.4 * out["jawOpen"].displacement,
+        {"FACIAL_C_Jaw": (part_rotation(rotation, 0.4), 0.4 * shift)},
+    )
+    for jaw_side, ends in (("Upper", "U"), ("Lower", "D")):
+        teeth = groups[f"helper-{jaw_side.lower()}-teeth"]
+        for name in [n for n in out if n.startswith("teeth") and n.endswith(ends)]:
+            shift = out[name].displacement[teeth].mean(axis=0)
+            out[name].joints[f"FACIAL_C_Teeth{jaw_side}"] = (np.eye(3), shift)
+    for side, letter in (("L", "l"), ("R", "r")):
+        eye = groups[f"helper-{letter}-eye"]
+        for look in ("Up", "Down", "Left", "Right"):
+            expression = out[f"eyeLook{look}{side}"]
+            moved = positions[eye] + expression.displacement[eye]
+            rotation, _ = rigid_fit(positions[eye], moved)
+            expression.joints[f"FACIAL_{side}_Eye"] = (rotation, np.zeros(3))
+
+
+def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
+    """float64[V, 3]: the fat of a cheek that a true smile pushes up, and over the line of the lip.
+
+    It ends at that line, where the skin turns in: the fold is part of the shape. Teeth stay.
+
+    Args:
+        units: what each raw control does, by its name.
+        places: float64[V, 3] on the man's head, measured from between his eyes, decimetres.
+        side: L or R.
+    """
+    away, there = from_laugh_line(places)
+    x, y = np.abs(places[:, 0]), places[:, 1]
+    ball = np.exp(-(((x - 0.40) / 0.15) ** 2) - ((y + 0.36) / 0.15) ** 2)
+    ball *= smooth_step((places[:, 2] + 0.45) / 0.3)
+    roll = there * np.exp(-(((away - 0.06) / 0.07) ** 2))
+    dip = there * np.exp(-(((away + 0.015) / 0.03) ** 2))
+    own = 1.0 if side == "L" else -1.0
+    half = places[:, 0] * own > 0
+    out = _CHEEK_BALL * ball[:, None] * [0.35 * own, 0.25, 0.9]
+    out = out * smooth_step((away + 0.02) / 0.06)[:, None]
+    out += _ROLL * (roll[:, None] * [0.3 * own, -0.1, 0.9] - 0.6 * dip[:, None] * [0.0, 0.0, 1.0])
+    moved = [units[name + side].displacement for name in ("mouthCornerPull", "eyeCheekRaise")]
+    soft = smooth_step(np.linalg.norm(moved, axis=2).max(axis=0) / 0.02)
+    return np.asarray(out * (half * soft)[:, None])
+
+
+def leave_bones(
+    out: dict[str, Expression],
+    groups: dict[str, Ints],
+    positions: Floats,
+    pivots: dict[str, Floats],
+) -> None:
+    """Teeth and eyeballs go with their joints alone: what is hard keeps its form. Pupils do not.
+
+    Args:
+        out: the expressions by name, with their joints; displacements are changed.
+        groups: vertex indices by group of the base mesh.
+        positions: float64[V, 3], decimetres.
+        pivots: joint positions by name.
+    """
+    bones: dict[str, tuple[str, ...]] = {
+        "helper-upper-teeth": ("FACIAL_C_TeethUpper",),
+        "helper-lower-teeth": ("FACIAL_C_TeethLower", "FACIAL_C_Jaw"),
+    }
+    for side, letter in (("L", "l"), ("R", "r")):
+        for name in ("helper-{}-eye", "eyeball-{}", "cornea-{}"):
+            bones[name.format(letter)] = (f"FACIAL_{side}_Eye",)
+    for name, unit in out.items():
+        unit.displacement = unit.displacement.copy()
+        for group, joints in bones.items():
+            if "Pupil" in name and "teeth" not in group:
+                continue
+            at = positions[groups[group]]
+            way = np.zeros_like(at)
+            for joint in joints:
+                if joint in unit.joints:
+                    way += rigid_way(at, pivots[joint], *unit.joints[joint])
+            unit.displacement[groups[group]] = way
+
+
+def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
+    """What brings lips together under an open jaw, by jawOpen and the control of each quarter.
+
+    The data's shape takes back what the jaw opens: over a shut jaw it would lift the lower lip far
+    over the upper one. So the controls do nothing by themselves.
+
+    Args:
+        out: the expressions by name; those of the lips' quarters become still.
+    """
+    result: dict[tuple[str, str], Floats] = {}
+    for name in LIPS_TOGETHER:
+        result[("jawOpen", name)] = out[name].displacement
+        out[name] = Expression(np.zeros_like(out[name].displacement))
+    return result
+
+
+def corrective_displacements(
+    out: dict[str, Expression], places: Floats
+) -> dict[tuple[str, str], Floats]:
+    """What to add where two controls meet; (a, b) fires with the product of both.
+
+    Args:
+        out: what each raw control does, by its name.
+        places: float64[V, 3] of the man's vertices, measured from between his eyes, decimetres.
+    """
+    lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
+    result: dict[tuple[str, str], Floats] = {}
+    for side in ("L", "R"):
+        # The open jaw stretches the lower lip: a smile cannot lift it as far.
+        smile = out[f"mouthCornerPull{side}"].displacement
+        result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
+        # The lower lid comes half way: the upper lid has that much less to close.
+        blink = out[f"eyeBlink{side}"].displacement
+        raised = out[f"eyeCheekRaise{side}"].displacement
+        travel = np.linalg.norm(blink, axis=1)
+        lid_rise = np.clip(raised[:, 1], 0, None)
+        near = travel > 0.02
+        share = np.zeros(len(blink))
+        share[near] = np.minimum(0.25, lid_rise[near].max() / max(travel.max(), 1e-9))
+        result[(f"eyeBlink{side}", f"eyeCheekRaise{side}")] = -share[:, None] * blink
+        ball = cheek_mass(out, places, side)
+        result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
+        for lips in ("mouthFunnel", "mouthLipsPurse"):
+            # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
+            result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
+    return result

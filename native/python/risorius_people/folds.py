@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""The line along which a smile folds the cheek over the lip. Lengths are decimetres."""
+
+from __future__ import annotations
+
+import numpy as np
+from risorius.base.easing import smooth_step
+
+from .polygons import Floats
+
+_DOWN = (0.36, 0.50, 0.62, 0.74, 0.86)  # below the eye
+_ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # from the middle of the face
+
+
+def from_laugh_line(places: Floats) -> tuple[Floats, Floats]:
+    """How far places lie from the line that runs from the wing of the nose past the mouth.
+
+    Args:
+        places: float64[..., 3] on the man's head, measured from between his eyes.
+
+    Returns:
+        float64[...] distances, positive on the cheek; and float64[...], 1 beside the line and 0
+        beyond its ends.
+    """
+    x, y = np.abs(places[..., 0]), places[..., 1]
+    away = 0.86 * (x - np.interp(-y, _DOWN, _ASIDE))
+    there = smooth_step((-y - 0.36) / 0.10) * smooth_step((0.90 + y) / 0.14)
+    return away, np.asarray(there * smooth_step((places[..., 2] + 0.5) / 0.2))

@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""Where lips, lids and brows are on the base mesh, as weights of its vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from risorius.author.geometry.polygon_mesh import vertex_normals
+from risorius.base.easing import smooth_step
+
+from ..polygons import Floats, Ints
+from ..source import BaseMesh
+
+MM = 0.01  # the data are in decimetres
+_TOUCHING = 0.03  # how far a lip's vertex is at most from the other lip
+_PARTED = 0.04  # how much further the jaw takes them apart at least
+_BETWEEN = 0.03  # the width of what belongs to both lips, at the corners
+_LID = 0.035  # how far the skin of a lid reaches from the roots of its lashes
+_CHUNK = 256
+
+
+def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
+    """Of each point: the nearest of the others, and how far it is.
+
+    Args:
+        points: float64[n, 3].
+        others: float64[m, 3].
+
+    Returns:
+        int64[n] and float64[n].
+    """
+    index = np.empty(len(points), np.int64)
+    distance = np.empty(len(points))
+    for begin in range(0, len(points), _CHUNK):
+        rows = slice(begin, begin + _CHUNK)
+        square = ((points[rows, None] - others[None]) ** 2).sum(axis=2)
+        index[rows] = square.argmin(axis=1)
+        distance[rows] = np.sqrt(square.min(axis=1))
+    return index, distance
+
+
+def bell(distance: Floats) -> Floats:
+    """float64[n]: 1 at 0, falling as a normal distribution does.
+
+    Args:
+        distance: float64[n], in standard deviations.
+    """
+    return np.asarray(np.exp(-(distance**2) / 2))
+
+
+@dataclass(frozen=True)
+class Places:
+    """What the further controls are made at. Arrays are by vertex of the base mesh, decimetres.
+
+    Attributes:
+        positions: float64[V, 3] of the man; his left is +x, he looks along +z.
+        normals: float64[V, 3].
+        groups: vertex indices by group of the base mesh.
+        skin: float64[V], 1 on the body.
+        lips: float64[V] by "U" and "D", which lip's side a vertex is on.
+        along: float64[V], 0 in the middle of the lips, 1 and -1 at their corners.
+        lip_distance: float64[V], from where the lips touch.
+        lids: float64[V] by "U" and "D", of both eyes, lashes too.
+        brows: float64[V], both.
+        eyes: float64[3], the middle of each eye, by "L" and "R".
+    """
+
+    positions: Floats
+    normals: Floats
+    groups: dict[str, Ints]
+    skin: Floats
+    lips: dict[str, Floats]
+    along: Floats
+    lip_distance: Floats
+    lids: dict[str, Floats]
+    brows: Floats
+    eyes: dict[str, Floats]
+
+    def eye_of(self) -> Floats:
+        """float64[V, 3]: the middle of the eye on the side of each vertex."""
+        left = self.positions[:, :1] > 0
+        return np.where(left, self.eyes["L"], self.eyes["R"])
+
+
+def find_places(
+    base: BaseMesh,
+    positions: Floats,
+    groups: dict[str, Ints],
+    jaw_open: Floats,
+    brow_shapes: Floats,
+) -> Places:
+    """All places of a face.
+
+    Args:
+        base: has the polygons.
+        positions: float64[V, 3], decimetres.
+        groups: vertex indices by group of the base mesh.
+        jaw_open: float64[V, 3], the motion of an opening jaw, which tells the lips apart.
+        brow_shapes: float64[V, 3], the summed motion of brows that go up and down.
+    """
+    count = len(positions)
+    faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
+    skin = np.zeros(count)
+    skin[groups["body"]] = 1
+    eyes = {s: positions[groups[f"helper-{s.lower()}-eye"]].mean(axis=0) for s in "LR"}
+    line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
+    corner = np.abs(line[:, 0]).max()
+    _, lip_distance = nearest(positions, line)
+    # An even curve of height over width: the lips touch over some millimetres, not on a line.
+    height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
+    aside = np.minimum(np.abs(positions[:, 0]), corner)
+    upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)
+    travel = np.linalg.norm(brow_shapes, axis=1) * skin
+    return Places(
+        positions,
+        vertex_normals(positions, faces),
+        groups,
+        skin,
+        {"U": upper, "D": 1 - upper},
+        positions[:, 0] / corner,
+        lip_distance,
+        {k: _lid(positions, groups, n) for k, n in (("D", 1), ("U", 2))},
+        smooth_step(travel / (0.6 * travel.max())),
+        eyes,
+    )
+
+
+def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
+    """Vertices of a lip that lie at the other one, with no face between, until the jaw opens.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        faces: vertices by face.
+        body: vertices of the skin.
+        jaw_open: float64[V, 3], the motion of an opening jaw.
+    """
+    front = body[(np.abs(positions[body, 0]) < 0.4) & (positions[body, 2] > 1.2)]
+    joined: dict[int, set[int]] = {}
+    for face in faces:
+        for vertex in face:
+            joined.setdefault(vertex, set()).update(face)
+    out = set()
+    for vertex in front:
+        near = front[np.linalg.norm(positions[front] - positions[vertex], axis=1) < _TOUCHING]
+        apart = np.linalg.norm(jaw_open[near] - jaw_open[vertex], axis=1) > _PARTED
+        if set(near[apart].tolist()) - joined[int(vertex)]:
+            out.add(int(vertex))
+    return np.array(sorted(out))
+
+
+def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
+    """float64[V]: how much a vertex goes with a lid, both eyes; lashes go with the skin below.
+
+    Args:
+        positions: float64[V, 3], decimetres.
+        groups: vertex indices by group of the base mesh.
+        number: of its group of lashes.
+    """
+    out = np.zeros(len(positions))
+    body = groups["body"]
+    for letter in "lr":
+        lashes = groups[f"helper-{letter}-eyelashes-{number}"]
+        skin_at, height = nearest(positions[lashes], positions[body])
+        roots = positions[lashes[height < np.quantile(height, 0.35)]]
+        index, distance = nearest(positions[body], roots)
+        weight = 1 - smooth_step(distance / _LID)
+        # The other lid is as near at the corners: what lies on its side of the roots stays.
+        beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
+        weight *= smooth_step((beyond + 0.004) / 0.006)
+        width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()
+        aside = (positions[body, 0] - roots[:, 0].mean()) / width
+        weight *= np.sqrt(np.clip(1 - aside**2, 0, 1))
+        out[body] = np.maximum(out[body], weight)
+        out[lashes] = weight[skin_at]
+    return out

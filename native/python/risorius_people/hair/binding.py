@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: MIT
+"""Cards as meshes of a Dna: each vertex has the weights and shapes of the skin that it stands on.
+
+They join a face when it is done: what moves the skin moves its hair as well, whatever the skin was
+fitted with, and the fit has none of them to do.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from risorius import BlendShapeTarget, Dna, Mesh
+from risorius.author.geometry import skeleton as sk
+from risorius.author.geometry.polygon_mesh import polygon_mesh
+
+from ..polygons import Floats, Ints
+from .strips import Strips, card_faces, card_vertices
+from .strips import unit as unit_vectors
+from .surface import Roots, about, nearest_places, nearest_rows
+
+_LEAST_WEIGHT = 0.01
+ARM = 0.8  # centimetres of a hair that turn with the skin; what is longer hangs
+_MOST_INFLUENCES = 8
+_PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
+
+
+def head_of(dna: Dna, lod: int) -> Mesh | None:
+    """The head's mesh of a level, if it has one.
+
+    Args:
+        dna: a sample face.
+        lod: the level.
+    """
+    for m in (int(i) for i in dna.lod_mesh_mapping[lod]):
+        if re.match(r"head_lod\d+_mesh$", dna.mesh_names[m]):
+            return dna.meshes[m]
+    return None
+
+
+def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
+    """int64[T, 3], triangles by vertex, and int64[V, n], those about each vertex."""
+    offsets = np.asarray(mesh.face_offsets, np.int64)
+    layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
+    sizes = np.diff(offsets)
+    parts = []
+    for size in np.unique(sizes).tolist():
+        rows = layouts[offsets[:-1][sizes == size][:, None] + np.arange(size)]
+        parts += [rows[:, [0, k, k + 1]] for k in range(1, size - 1)]
+    triangles = np.concatenate(parts)
+    return triangles, about(triangles, len(mesh.positions))
+
+
+def whereabouts(dna: Dna, head: Mesh) -> Floats:
+    """float64[V, 12]: where vertices are at rest, with an open jaw and with either eye closed.
+
+    What touches at rest, as lips and lids do, is far apart in it.
+
+    Args:
+        dna: has the controls.
+        head: a mesh of the head.
+    """
+    count = len(dna.raw_control_names)
+    motions = sk.column_motions(dna, sk.column_count(dna))[:count]
+    weights = sk.dense_weights(head, len(dna.joint_names))
+    positions = np.asarray(head.positions, np.float64)
+    shapes = sk.column_shapes(dna, head, count)
+    out = [positions]
+    for name in _PARTING:
+        column = list(dna.raw_control_names).index(name)
+        out.append(sk.skinned(positions + shapes.get(column, 0.0), weights, motions[column]))
+    return np.concatenate(out, axis=1)
+
+
+def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Floats) -> Roots:
+    """The place of the skin that each vertex of the cards moves with.
+
+    Args:
+        head: the head.
+        strips: the cards.
+        unit: of the mesh, in theirs.
+        own: float64[n, 12], whereabouts of the roots; None: the head is the one that they are on.
+        there: float64[V, 12], whereabouts of the head's vertices.
+    """
+    positions = np.asarray(head.positions, np.float64) / unit
+    triangles, around = corners_of(head)
+    rooted = strips.roots
+    if own is not None:
+        vertex = nearest_rows(own, there)
+        rooted = nearest_places(positions, triangles, around, strips.points[:, 0], vertex)
+    corners = np.repeat(rooted.corners[:, None], strips.rows, axis=1)
+    shares = np.repeat(rooted.shares[:, None], strips.rows, axis=1)
+    with_skin = strips.held > 0
+    if with_skin.any():
+        later = strips.points[with_skin, 1:]
+        rows = nearest_places(positions, triangles, around, later.reshape(-1, 3))
+        corners[with_skin, 1:] = rows.corners.reshape(*later.shape[:2], 3)
+        shares[with_skin, 1:] = rows.shares.reshape(*later.shape[:2], 3)
+    return Roots(
+        np.repeat(corners.reshape(-1, 3), 2, axis=0), np.repeat(shares.reshape(-1, 3), 2, axis=0)
+    )
+
+
+def card_mesh(strips: Strips, unit: float) -> Mesh:
+    """The cards without skin and shapes.
+
+    Args:
+        strips: the cards, decimetres.
+        unit: of the mesh, in theirs.
+    """
+    positions, normals = card_vertices(strips)
+    faces, uvs = card_faces(strips)
+    return polygon_mesh(positions * unit, normals, faces, uvs, faces)
+
+
+class Turning:
+    """How far a shape of the skin turns what stands off from it.
+
+    What a joint moves turns with it; a shape only shifts, and a beard that is shifted with a lip
+    that rolls in stands in the skin beside it. Args of the constructor: as of bind.
+    """
+
+    def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:
+        triangles, _ = corners_of(head)
+        used, rows = np.unique(places.corners, return_inverse=True)
+        row = np.full(len(head.positions), len(used))
+        row[used] = np.arange(len(used))
+        self._triangles = triangles[(row[triangles] < len(used)).any(axis=1)]
+        self._rows = row[self._triangles].ravel()
+        self._count = len(used)
+        self._places = Roots(rows.reshape(places.corners.shape), places.shares)
+        self._skin = np.asarray(head.positions, np.float64)
+        off = np.asarray(mesh.positions, np.float64) - places.of(self._skin)
+        far = np.linalg.norm(off, axis=1, keepdims=True)
+        self._off = off * np.minimum(1.0, ARM / far.clip(1e-12))
+        self._normals = self._normals_at(self._skin)
+
+    def _normals_at(self, skin: Floats) -> Floats:
+        """float64[n, 3], unit: of the skin, where the places are."""
+        a, b, c = (skin[self._triangles[:, k]] for k in range(3))
+        faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        sums = [np.bincount(self._rows, faces[:, k], self._count + 1) for k in range(3)]
+        return unit_vectors(self._places.of(unit_vectors(np.stack(sums, axis=1)[:-1])))
+
+    def of(self, delta: Floats) -> Floats:
+        """float64[n, 3], what a shape moves the cards beyond what it shifts their places.
+
+        Args:
+            delta: float64[V, 3] of the skin.
+        """
+        return turned(self._off, self._normals, self._normals_at(self._skin + delta))
+
+
+def turned(off: Floats, was: Floats, now: Floats) -> Floats:
+    """float64[..., 3]: how far ends move that turn with a normal.
+
+    Args:
+        off: float64[..., 3], from where the normal stands to each end.
+        was, now: float64[..., 3], unit: the normal.
+    """
+    axis = np.cross(was, now)
+    # Half around there is no one way to turn.
+    cosine = (was * now).sum(axis=-1, keepdims=True).clip(-0.5)
+    across = np.cross(axis, off)
+    return np.asarray(across + np.cross(axis, across) / (1 + cosine))
+
+
+def bind(
+    dna: Dna,
+    mesh: Mesh,
+    head: Mesh,
+    places: Roots,
+    least: float,
+    rigid: bool,
+    turns_itself: bool = False,
+) -> None:
+    """Give cards the skin weights and shapes of the places that they stand on.
+
+    Args:
+        dna: has the joints.
+        mesh: the cards; gets weights and shapes.
+        head: the skin.
+        places: on it, of each vertex of the cards.
+        least: shapes that move none of them further are left out, in the mesh' unit.
+        rigid: what the skin moves less than that hangs on the joint of the head alone.
+        turns_itself: something else turns the cards when a shape turns the skin.
+    """
+    weights = places.of(sk.dense_weights(head, len(dna.joint_names)))
+    if rigid:
+        still = _still(dna, head, places, least)
+        weights[still] = np.eye(weights.shape[1])[list(dna.joint_names).index("head")]
+    most = min(_MOST_INFLUENCES, weights.shape[1])
+    few = np.partition(weights, -most, axis=1)[:, [-most]]
+    weights = np.where((weights >= few) & (weights > _LEAST_WEIGHT), weights, 0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    vertex, joint = np.nonzero(weights)
+    counts = (weights > 0).sum(axis=1)
+    mesh.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
+    mesh.skin_weights, mesh.skin_joint_indices = weights[vertex, joint], joint
+    mesh.maximum_influence_per_vertex = int(counts.max())
+    turning = None if turns_itself else Turning(head, places, mesh)
+    targets = []
+    for target in head.blend_shape_targets:
+        delta = np.zeros((len(head.positions), 3))
+        delta[np.asarray(target.vertex_indices, np.int64)] = np.asarray(target.deltas)
+        own = places.of(delta)
+        if turning is not None and own.any():
+            own += turning.of(delta)
+        far = np.abs(own).max(axis=1)
+        if far.max(initial=0) < least:
+            continue
+        moved = np.flatnonzero(far > least / 4)
+        channel = int(target.blend_shape_channel_index)
+        targets.append(
+            BlendShapeTarget(
+                deltas=own[moved], vertex_indices=moved, blend_shape_channel_index=channel
+            )
+        )
+    mesh.blend_shape_targets = targets
+
+
+def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
+    """bool[n]: which places no control of the face moves further, and no neck carries."""
+    used, rows = np.unique(places.corners, return_inverse=True)
+    count = len(dna.raw_control_names)
+    motions = sk.column_motions(dna, sk.column_count(dna))[:count]
+    weights = sk.dense_weights(head, len(dna.joint_names))[used]
+    positions = np.asarray(head.positions, np.float64)[used]
+    shapes = sk.column_shapes(dna, head, count)
+    below = _apart_from_head(dna)
+    far = np.where(weights[:, below].sum(axis=1) > _LEAST_WEIGHT, np.inf, 0.0)
+    for column, name in enumerate(dna.raw_control_names):
+        if re.search(r"\.(head|neck)", name):
+            continue
+        shape = shapes[column][used] if column in shapes else 0.0
+        moved = sk.skinned(positions + shape, weights, motions[column])
+        far = np.maximum(far, np.linalg.norm(moved - positions, axis=1))
+    return np.asarray(far[rows.reshape(places.corners.shape)].max(axis=1) < least)
+
+
+def _apart_from_head(dna: Dna) -> list[int]:
+    """The joints that hang neither on the joint of the head nor are it."""
+    head, parents = list(dna.joint_names).index("head"), np.asarray(dna.joint_parents, np.int64)
+    on_head = np.arange(len(parents)) == head
+    for _ in range(len(parents)):
+        on_head |= on_head[parents]
+    return np.flatnonzero(~on_head).tolist()
+
+
+def append_mesh(dna: Dna, name: str, mesh: Mesh, lods: list[int]) -> None:
+    """One more mesh at the end of a Dna.
+
+    Args:
+        dna: is changed.
+        name: of the mesh.
+        mesh: finished.
+        lods: the levels that show it.
+    """
+    number = len(dna.mesh_names)
+    dna.mesh_names = [*dna.mesh_names, name]
+    dna.meshes = [*dna.meshes, mesh]
+    mapping = dna.lod_mesh_mapping
+    rows = [[int(i) for i in mapping[lod]] for lod in range(dna.lod_count)]
+    dna.lod_mesh_mapping = [r + [number] * (lod in lods) for lod, r in enumerate(rows)]
+    pairs = [(number, int(t.blend_shape_channel_index)) for t in mesh.blend_shape_targets]
+    before = np.asarray(dna.mesh_blend_shape_channel_mapping, np.int64).reshape(-1, 2)
+    after = np.array(pairs, np.int64).reshape(-1, 2)
+    dna.mesh_blend_shape_channel_mapping = np.concatenate([before, after])

@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: MIT
+"""Hair of the scalp by style: short crops, receding, a bun, long hair, tight curls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from risorius.base.easing import smooth_step
+
+from ..paint.atlas import DENSE, TILES, tile
+from ..paint.places import HAIRLINES, hairline_height, thinned, wavy
+from ..people import Person
+from ..polygons import Floats, Ints
+from .growth import curled, eased, grow, tangent
+from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
+from .surface import Roots, Surface
+
+_WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
+_PARTING = 0.10  # how far to his left hair is parted
+_THIN = TILES["scalp"][4] - DENSE
+_LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights at which a fringe ends, of the man
+_FINE = 0.75  # spacing of short hair where it begins over the forehead, of that elsewhere
+_CLOSE = 0.6  # hair_length of an afro that is so short that it lies on the head
+
+
+def whorl_flow(surface: Surface, side: float) -> Floats:
+    """float64[V, 3]: hair from the whorl of the crown outward, turning where it begins.
+
+    Args:
+        surface: the head.
+        side: how far the hair over the forehead is combed to his right, 0 to 1.
+    """
+    man, normals = surface.man, surface.man_normals
+    away = tangent(man - _WHORL, normals)
+    distance = np.linalg.norm(man - _WHORL, axis=1)
+    swirl = np.cross(normals, away) * (0.9 * np.exp(-distance / 0.3))[:, None]
+    flow = away + swirl
+    down = smooth_step((np.abs(normals[:, 0]) - 0.45) / 0.4)[:, None]
+    flow = flow * (1 - down) + down * np.array([0.0, -1.0, -0.12])
+    front = smooth_step((man[:, 2] + 0.7) / 0.7) * smooth_step((man[:, 1] - 0.45) / 0.25)
+    flow = flow + (side * front)[:, None] * np.array([-0.9, 0.25, 0.1])
+    return tangent(flow, surface.normals)
+
+
+def _roots(
+    surface: Surface,
+    spacing: float,
+    random: np.random.Generator,
+    style: str,
+    even: bool = True,
+    fine: float = 0.0,
+) -> tuple[Roots, Floats]:
+    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man.
+
+    Those of short hair are not even: it lies flat at the sides and stands up on top. Those of
+    long hair are finer at the edge, and with `fine` 1 also at a parting.
+    """
+    man = surface.man
+    inside = hairline_height(man, *HAIRLINES[style])
+    inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
+    if even:  # no line: single hairs stand before it, and the corners over the temples are round
+        inside = inside + 0.016 * wavy(man, random, 1.6)
+    density = smooth_step((inside + 0.03) / 0.11 if even else inside / 0.07)
+    density = density * (1 - thinned(man, style))
+    if not even:
+        density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
+        density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
+        # Over the forehead one sees single cards: there they stand closer, and are narrower.
+        edge = np.exp(-((inside / 0.09) ** 2)) * smooth_step((man[:, 2] + 0.8) / 0.4)
+        density = density * (_FINE**2 + (1 - _FINE**2) * edge)
+    if fine:
+        parting = np.exp(-(((man[:, 0] - _PARTING) / 0.09) ** 2)) * smooth_step(
+            (man[:, 1] - 0.5) / 0.2
+        )
+        within = smooth_step((inside - 0.05) / 0.08) * (1 - fine * parting)
+        density = density * (1 - 0.6 * within)
+    density[surface.man_normals[:, 1] < -0.8] = 0
+    roots = surface.scattered(density, spacing, random)
+    return roots, roots.of(inside[:, None])[:, 0]
+
+
+def _tiles(inside: Floats, random: np.random.Generator, edge: float = 0.07) -> Floats:
+    """Thin tiles at the hairline and here and there, dense ones elsewhere."""
+    n = len(inside)
+    thin = (inside < edge * random.uniform(0.4, 1.3, n)) | (random.random(n) < 0.12)
+    numbers = np.where(thin, DENSE + random.integers(0, _THIN, n), random.integers(0, DENSE, n))
+    return tile("scalp", numbers)
+
+
+def _scalp_vertices(surface: Surface) -> Floats:
+    man = surface.man
+    return np.flatnonzero((hairline_height(man) > -0.25) & (man[:, 1] > -0.95))
+
+
+def crop(surface: Surface, person: Person) -> Strips:
+    """Short hair: some centimetres on top, brushed aside, shorter at the sides and the nape.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the usual.
+    """
+    return _short(surface, person, 31, "crop", top=0.32, sides=0.22)
+
+
+def receding(surface: Surface, person: Person) -> Strips:
+    """An old man's: gone back over the temples, thin on top, combed back.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the usual.
+    """
+    return _short(surface, person, 32, "receding", top=0.30, sides=0.20)
+
+
+def _short(
+    surface: Surface, person: Person, seed: int, style: str, top: float, sides: float
+) -> Strips:
+    random = np.random.default_rng(seed)
+    recession = HAIRLINES[style][0]
+    spacing = 0.043 if recession == 0 else 0.046
+    roots, inside = _roots(surface, _FINE * spacing, random, style, even=False)
+    n = len(roots)
+    man = roots.of(surface.man)
+    high = smooth_step((man[:, 1] - 0.30) / 0.40)
+    fore = smooth_step((man[:, 2] + 0.5) / 0.6) * high
+    length = sides + (top - sides) * high + 0.16 * fore
+    edge = 0.5 + 0.2 * fore * (recession == 0)  # hair over the forehead hides where it begins
+    length *= edge + (1 - edge) * smooth_step(inside / 0.2)
+    nape = smooth_step((-0.25 - man[:, 1]) / 0.3)
+    length *= (1 - 0.45 * nape) * person.hair_length * surface.scale * random.uniform(0.75, 1.2, n)
+    flow = whorl_flow(surface, 0.6 if recession == 0 else 0.3)
+    if recession:
+        back = tangent(np.tile([0.15, 0.1, -1.0], (len(flow), 1)), surface.normals)
+        comb = smooth_step((surface.man[:, 1] - 0.2) / 0.3)[:, None]
+        flow = tangent(flow * (1 - comb) + comb * back, surface.normals)
+    clump = 0.14 * np.column_stack([wavy(surface.man, random, 6.0) for _ in range(3)])
+    flow, sway = flow + clump, 0.14 * random.normal(0, 1, (n, 3))
+    quiff = fore * (recession == 0)
+    low = 16 + (18 if recession == 0 else 12) * high - 4 * quiff
+    rise = np.radians(low + random.uniform(-7, 9, n)), np.radians(2 + 6 * high - 6 * quiff)
+    near = _scalp_vertices(surface)
+    points, out = grow(surface, roots, flow, length, rise, 5, near, 0.006, sway=sway)
+    points = eased(points)
+    half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
+    half *= 0.5 + 0.5 * smooth_step(inside / 0.14)
+    turns = np.radians(random.uniform(-1, 1, n) * (6 + 20 * high))
+    # Short hair is low along all of its length.
+    steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
+    turns = np.clip(turns, -steep, steep)
+    taper = np.array([0.85, 0.97, 1.0, 0.91, 0.7])
+    return make_strips(points, out, half, taper, _tiles(inside, random, 0.15), roots, turns)
+
+
+def afro(surface: Surface, person: Person) -> Strips:
+    """Tight curls that stand away from the head on all sides; short ones lie on it.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of four centimetres.
+    """
+    random = np.random.default_rng(33)
+    short = person.hair_length < _CLOSE
+    roots, inside = _roots(surface, 0.046 if short else 0.062, random, "afro")
+    n = len(roots)
+    man = roots.of(surface.man)
+    length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
+    length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
+    flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
+    # Of a card that stands upright one sees the edge, where too little hair hides it.
+    upright = np.zeros(n) if short else smooth_step((inside - 0.03) / 0.15)
+
+    def between(lying: tuple[float, float], standing: tuple[float, float]) -> Floats:
+        low, high = random.uniform(*lying, n), random.uniform(*standing, n)
+        return np.radians(low + upright * (high - low))
+
+    rise = between((15, 40), (45, 88)), between((0, 35), (10, 80))
+    rows = 2 if short else 4
+    near = _scalp_vertices(surface)
+    points, out = grow(surface, roots, flow, length, rise, rows, near, 0.01, 0.7)
+    wind = 0.05 * person.hair_curl * person.hair_length * random.uniform(0.6, 1.2, n)
+    points = curled(points, out, wind, random.uniform(0.6, 1.3, n), random)
+    half = 0.090 * (0.5 + 0.5 * person.hair_length) * random.uniform(0.8, 1.2, n)
+    half *= (
+        (0.4 + 0.6 * smooth_step((inside + 0.02) / 0.15)) * surface.scale * (0.75 if short else 1.0)
+    )
+    middle = np.array([0.0, 0.1, -0.75])
+    out = unit(out + 0.6 * unit(man - middle)[:, None])
+    turns = between((-16, 16), (0, 180))
+    taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
+    strips = make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
+    # Over the forehead a frown moves the skin: what stands deep in it there would go deeper.
+    strips.sides[:, 0] *= (0.5 + 0.5 * smooth_step(inside / 0.15))[:, None]
+    return strips
+
+
+def long(surface: Surface, person: Person) -> Strips:
+    """Hair to the shoulders, parted beside the middle, behind the face.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the usual.
+    """
+    random = np.random.default_rng(34)
+    roots, inside = _roots(surface, 0.066, random, "long", fine=1.0)
+    n = len(roots)
+    man = roots.of(surface.man)
+    flow = parted_flow(surface)
+    sway = 0.10 * random.normal(0, 1, (n, 3))
+    # Each hair ends at about the same height: what begins higher is longer.
+    way = 0.85 * (man[:, 1] + 0.55) + 1.15
+    length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
+    length *= random.uniform(0.88, 1.08, n)
+    rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
+    above = np.flatnonzero(surface.man[:, 1] > -1.9)
+    least = (0.036 + 0.02 * random.random(n)) * surface.scale  # an ear that is raised stays under
+    points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2, sway)
+    wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
+    points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
+    half = (
+        (0.026 + 0.056 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
+    )
+    turns = np.radians(random.uniform(-10, 10, n))
+    taper = np.interp(np.linspace(0, 1, 9), [0, 0.2, 0.8, 1], [0.7, 1.0, 1.0, 0.75])
+    tiles = _tiles(inside, random, 0.10)
+    falling = make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
+    if not person.hair_fringe:
+        return falling
+    return joined([falling, _fringe(surface, person, len(taper), random)])
+
+
+def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
+    """Hair from behind the hairline that falls over the forehead, straight and even at its end."""
+    man = surface.man
+    inside = hairline_height(man, *HAIRLINES[person.hair_style])
+    x, y, z = man.T
+    density = smooth_step((0.34 - inside) / 0.15) * (inside > 0.01)
+    density = density * smooth_step((0.50 - np.abs(x)) / 0.10) * (y > 0.42) * (z > -0.75)
+    roots = surface.scattered(density, 0.054, random)
+    n = len(roots)
+    top = smooth_step((surface.man_normals[:, 1] - 0.3) / 0.4)
+    flow = np.column_stack([0.35 * x * top + 0.10, -1 + 0.7 * top, 0.2 + top])
+    length = 1.1 * surface.scale * random.uniform(0.9, 1.1, n)
+    rise = np.radians(random.uniform(14, 26, n)), np.zeros(n)
+    near = np.flatnonzero((y > -0.3) & (z > -1.5))
+    # The skin of the forehead comes and goes under it.
+    least = (0.025 + 0.03 * random.random(n)) * surface.scale
+    sway = 0.07 * random.normal(0, 1, (n, 3))
+    points, out = grow(surface, roots, flow, length, rise, rows, near, least, 0.4, 0.3, 1.0, sway)
+    end = _LINE_OF_BROWS + (1 - person.hair_fringe) * (_HIGH_ON_FOREHEAD - _LINE_OF_BROWS)
+    points, out = _ended(surface, points, out, end + 0.02 * random.normal(0, 1, n), near)
+    half = random.uniform(0.034, 0.056, n) * surface.scale
+    taper = np.interp(np.linspace(0, 1, rows), [0, 0.2, 0.75, 1], [0.7, 1.0, 0.9, 0.6])
+    turns = np.radians(random.uniform(-8, 8, n))
+    tiles = _tiles(roots.of(inside[:, None])[:, 0], random, 0.06)
+    return make_strips(points, out, half, taper, tiles, roots, turns, held=0.0)
+
+
+def _ended(
+    surface: Surface, points: Floats, out: Floats, end: Floats, near: Ints
+) -> tuple[Floats, Floats]:
+    """Guides that end where they come down to a height of the head, as many points in each.
+
+    Args:
+        surface: the head.
+        points, out: float64[n, rows, 3] each, of grow.
+        end: float64[n], heights of the man.
+        near: vertices of the surface that they may come near.
+    """
+    n, rows, _ = points.shape
+    _, _, vertex = surface.below(points.reshape(-1, 3), near)
+    height = surface.man[vertex, 1].reshape(n, rows)
+    k = np.arange(rows)
+    for guide in range(n):
+        # What turns up again at its tip would be met from its other side.
+        down = np.minimum.accumulate(height[guide])
+        last = float(np.interp(-end[guide], -down, k))
+        at = np.linspace(0, max(last, 0.5), rows)
+        for way in (points, out):
+            way[guide] = np.column_stack([np.interp(at, k, way[guide, :, j]) for j in range(3)])
+    return points, unit(out)
+
+
+def parted_flow(surface: Surface) -> Floats:
+    """float64[V, 3]: hair that falls to both sides of a parting and back behind the ears.
+
+    Args:
+        surface: the head.
+    """
+    man = surface.man
+    x, y, z = man.T
+    aside = np.tanh((x - _PARTING) / 0.03)
+    top = smooth_step((y - 0.35) / 0.45)
+    flow = np.column_stack([1.0 * aside * top, -0.55 - 0.6 * (1 - top), -0.35 - 0.1 * top])
+    fore = smooth_step((z + 0.5) / 0.5) * top
+    flow[:, 1] += 0.4 * fore
+    flow[:, 2] -= 0.55 * fore
+    # Before and above the ears it goes back, under them it falls.
+    before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
+    flow[:, 2] -= 0.9 * before
+    low = smooth_step((-0.35 - y) / 0.25)[:, None]
+    flow = flow * (1 - low) + low * np.array([0.0, -1.0, 0.0])
+    return tangent(flow, surface.normals)
+
+
+_KNOT = np.array([0.0, 0.46, -1.72])  # where a bun sits, of the man
+
+
+def bun(surface: Surface, person: Person) -> Strips:
+    """Hair drawn back to a knot.
+
+    Args:
+        surface: the head.
+        person: `hair_length` is a share of the knot's size.
+    """
+    random = np.random.default_rng(35)
+    roots, inside = _roots(surface, 0.060, random, "bun", fine=0.01)
+    n = len(roots)
+    man = roots.of(surface.man)
+    knot = int(((surface.man - _KNOT) ** 2).sum(axis=1).argmin())
+    at, out = surface.positions[knot], surface.normals[knot]
+    flow = tangent(_KNOT - surface.man, surface.normals)
+    sway = 0.05 * random.normal(0, 1, (n, 3))
+    length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
+    length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
+    full = smooth_step(man[:, 1] / 0.4)  # not tight over forehead and temples
+    rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
+    above = _scalp_vertices(surface)
+    least = (0.004 + 0.035 * full + (0.014 + 0.02 * full) * random.random(n)) * surface.scale
+    points, outside = grow(
+        surface, roots, flow, length, rise, 6, above, least, 0.3, hug=1.2, sway=sway
+    )
+    half = (0.032 + 0.04 * smooth_step(inside / 0.14)) * surface.scale * random.uniform(0.8, 1.2, n)
+    turns = np.radians(random.uniform(-5, 5, n))
+    taper = np.interp(np.linspace(0, 1, 6), [0, 0.2, 0.7, 1], [0.75, 1.0, 0.8, 0.45])
+    tiles = _tiles(inside, random, 0.12)
+    drawn = make_strips(points, outside, half, taper, tiles, roots, turns)
+    size = 0.27 * surface.scale * person.hair_length
+    wound = _knot(surface.nearest(at[None]), at + 0.72 * size * out, out, size, random)
+    return joined([drawn, wound])
+
+
+def _knot(
+    root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
+) -> Strips:
+    """Strips wound about an axis into a ball, those inside of it opaque."""
+    count, rows = 64, 6
+    across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
+    other = np.cross(axis, across)
+    inner = np.arange(count) < 24
+    begin = np.where(inner, np.arange(count) * 0.7, random.uniform(0, 2 * np.pi, count))
+    t = np.linspace(0, 1, rows)
+    around = begin[:, None] + np.radians(np.where(inner, 150, 190))[:, None] * t
+    low = np.where(inner, np.linspace(-0.9, 1.2, count) * 0 - 0.2, random.uniform(-0.7, 0.5, count))
+    up = low[:, None] + np.where(inner, 1.1, random.uniform(0.5, 1.1, count))[:, None] * t
+    up = np.minimum(up, 1.35)
+    ray = (
+        np.cos(up)[..., None]
+        * (np.cos(around)[..., None] * across + np.sin(around)[..., None] * other)
+        + np.sin(up)[..., None] * axis
+    )
+    flat = np.where(inner, 0.9, random.uniform(0.97, 1.06, count))[:, None, None]
+    points = middle + size * flat * ray
+    half = np.where(inner, 0.62, random.uniform(0.16, 0.26, count)) * size
+    numbers = np.arange(count)
+    tiles = np.where(inner, tile("solid", numbers), tile("scalp", numbers % DENSE))
+    roots = Roots(np.repeat(root.corners, count, 0), np.repeat(root.shares, count, 0))
+    taper = np.interp(t, [0, 0.15, 0.85, 1], [0.8, 1.0, 1.0, 0.6])
+    return make_strips(points, ray, half, taper, tiles, roots, held=0.0)
+
+
+STYLES: dict[str, Callable[[Surface, Person], Strips]] = {
+    "crop": crop,
+    "receding": receding,
+    "afro": afro,
+    "long": long,
+    "bun": bun,
+}

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""Where hair grows on the man's head, as densities of its vertices, drawn beside his eyes.
+
+All maps are in decimetres relative to the middle of the eyes: x to the side, y up, z to the front.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from risorius.base.easing import smooth_step
+
+from ..polygons import Floats
+
+# The hairline seen from the side, from the nape over the ear to the middle of the forehead.
+_LINE = np.array(
+    [
+        (-2.20, -0.66),
+        (-1.50, -0.70),
+        (-1.28, -0.64),
+        (-1.12, -0.42),
+        (-1.05, -0.12),
+        (-1.00, 0.06),
+        (-0.90, 0.13),
+        (-0.70, 0.12),
+        (-0.60, 0.06),
+        (-0.575, -0.20),
+        (-0.44, -0.22),
+        (-0.40, -0.02),
+        (-0.36, 0.14),
+        (-0.29, 0.32),
+        (-0.20, 0.46),
+        (-0.06, 0.58),
+        (0.08, 0.655),
+        (0.30, 0.70),
+        (0.90, 0.74),
+    ]
+)
+HAIRLINES = {  # by style: recession, sideburn and low of hairline_height
+    "none": (0.0, 1.0, 0.0),
+    "crop": (0.0, 1.0, 0.0),
+    "receding": (0.75, 1.0, 0.0),
+    "long": (0.0, 0.7, 1.0),
+    "bun": (0.0, 0.45, 0.7),
+    "afro": (0.0, 0.6, 0.0),
+}
+_THIN_TOP = {"receding": 0.55}
+_NO_SIDEBURN = slice(9, 12)  # points of the line that hang down before the ear
+
+
+def wavy(points: Floats, random: np.random.Generator, waves: float, count: int = 12) -> Floats:
+    """float64[n] of smooth noise in about [-1, 1] at places of space.
+
+    Args:
+        points: float64[n, 3].
+        random: gives it.
+        waves: how many lie on a decimetre.
+        count: of the waves that are added.
+    """
+    ways = random.normal(0, 1, (count, 3))
+    ways *= 2 * np.pi * waves / np.linalg.norm(ways, axis=1, keepdims=True)
+    turns = random.uniform(0, 2 * np.pi, count)
+    return np.asarray(np.sin(points @ ways.T + turns).sum(axis=1) / np.sqrt(count))
+
+
+def hairline_height(
+    points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
+) -> Floats:
+    """float64[n]: how far inside the hairline a place is, negative outside of it.
+
+    Args:
+        points: float64[n, 3], of the man.
+        recession: how far the line has gone back above the temples and the forehead, 0 to 1.
+        sideburn: how much of the hair before the ear there is, 0 to 1.
+        low: how much lower and rounder the line over the forehead is, as on women, 0 to 1.
+    """
+    line = _LINE.copy()
+    line[_NO_SIDEBURN, 1] = (1 - sideburn) * 0.1 + sideburn * line[_NO_SIDEBURN, 1]
+    x, back, up = np.abs(points[:, 0]), points[:, 2].copy(), points[:, 1].copy()
+    front = smooth_step((back + 0.75) / 0.4)
+    corner = np.exp(-(((x - 0.40) / 0.16) ** 2))
+    gone = (0.05 - 0.09 * low) * corner + recession * (0.30 + 0.35 * corner) - 0.045 * low
+    up -= front * gone * smooth_step((up - 0.25) / 0.3)
+    inside = up > np.interp(back, line[:, 0], line[:, 1])
+    place = np.column_stack([back, up])
+    a, b = line[:-1], line[1:]
+    way = b - a
+    t = ((place[:, None] - a) * way).sum(-1) / (way * way).sum(-1)
+    foot = a + np.clip(t, 0, 1)[..., None] * way
+    distance = np.linalg.norm(place[:, None] - foot, axis=-1).min(axis=1)
+    return np.where(inside, distance, -distance)
+
+
+def thinned(points: Floats, style: str) -> Floats:
+    """float64[n]: the share of hair that is lost on top.
+
+    Args:
+        points: float64[n, 3], of the man.
+        style: of people.HAIR_STYLES.
+    """
+    return np.asarray(_THIN_TOP.get(style, 0.0) * smooth_step((points[:, 1] - 0.55) / 0.3))
+
+
+def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
+    """Place along a brow, 0 at the nose and 1 at the temple, and height over its middle.
+
+    Args:
+        points: float64[n, 3], of the man.
+        eye: how far the middle of his eye is from the middle of the face.
+    """
+    along = (np.abs(points[:, 0]) - (eye - 0.185)) / 0.44
+    return along, points[:, 1] - brow_ridge(along)
+
+
+def brow_ridge(along: Floats) -> Floats:
+    """float64[n]: how high the middle of a brow is over the eye's, decimetres.
+
+    Args:
+        along: float64[n], 0 at the nose and 1 at the temple.
+    """
+    return np.interp(
+        along,
+        [-0.2, 0.0, 0.2, 0.4, 0.6, 0.75, 0.9, 1.0, 1.2],
+        [0.150, 0.158, 0.178, 0.198, 0.214, 0.214, 0.196, 0.175, 0.125],
+    )
+
+
+def brow_width(along: Floats) -> Floats:
+    """float64[n]: half the width of a brow, decimetres.
+
+    Args:
+        along: float64[n], 0 at the nose and 1 at the temple.
+    """
+    return np.interp(along, [0.0, 0.15, 0.5, 0.8, 1.0], [0.024, 0.033, 0.031, 0.019, 0.007])
+
+
+def brow_density(points: Floats, eye: float) -> Floats:
+    """float64[n], 0 to 1: thinner at both ends, its lower edge cleaner than its upper one.
+
+    Args:
+        points: float64[n, 3], of the man.
+        eye: how far the middle of his eye is from the middle of the face.
+    """
+    along, height = brow_place(points, eye)
+    across = height / brow_width(np.clip(along, 0, 1))
+    body = 1 - smooth_step((np.abs(across) - 0.45) / 0.75)
+    ends = smooth_step((along + 0.02) / 0.11) * (1 - smooth_step((along - 0.86) / 0.18))
+    return np.asarray(body * ends * (points[:, 2] > -0.35))
+
+
+def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
+    """float64[n], 0 to 1: of the hair of the lower face.
+
+    Args:
+        points: float64[n, 3], of the man.
+        lips: float64[n], 1 on the lips and in the mouth.
+        style: of people.BEARD_STYLES, but "none".
+    """
+    x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
+    # From before the ear down over the cheek to the corner of the mouth.
+    cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.66])
+    under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.20, -1.30])
+    edge = smooth_step((cheek - y) / 0.10) * smooth_step((y - under) / 0.12)
+    edge *= smooth_step((z + 0.66) / 0.08)
+    moustache = smooth_step((0.33 - x) / 0.05) * smooth_step((y + 0.76) / 0.04)
+    moustache *= smooth_step((-0.52 - y) / 0.05) * (z > 0.12)
+    chin = smooth_step((0.36 - x) / 0.10) * smooth_step((z + 0.02) / 0.12) * edge
+    bare = np.exp(-(((x - 0.17) / 0.07) ** 2) - ((y + 0.88) / 0.05) ** 2)  # beside the soul patch
+    full = np.maximum(edge * (1 - 0.7 * bare * (z > 0.1)), moustache)
+    goatee = np.maximum(moustache, chin * smooth_step((-0.66 - y) / 0.05) * (1 - 0.8 * bare))
+    shape = {"full": full, "short": full, "goatee": goatee, "moustache": moustache}[style]
+    return np.asarray(shape * (1 - np.clip(1.5 * lips, 0, 1)))

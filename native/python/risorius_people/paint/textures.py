@@ -1,0 +1,266 @@
+# SPDX-License-Identifier: MIT
+"""All textures of a person, by file name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from risorius.files.png import png
+
+from .. import wrinkles
+from ..expressions import Expression
+from ..part import Part
+from ..people import Person
+from ..polygons import Floats
+from .cloth import paint_cloth
+from .eyes import paint_eye
+from .form import form, hollows, share_at
+from .images import enlarged, shrunk, smooth
+from .raster import Raster, filled
+from .regions import DIVIDED, find_face
+from .relief import heights, normals, roughness
+from .skin import HEAD_SIZE, Skin, Texels
+
+MASK_SIZE = 512
+WRINKLE_SHARE = 2  # a texel of the sets is as wide as so many of the colour
+STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))  # of each fold, by years, in a face at rest
+_FROWN_ENDS = (0.17, 0.27)  # decimetres over the eyes: higher up its lines would cross the brow's
+
+
+def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
+    """float64[h, w]: how deep folds are, less on the fat of the cheeks, which bulges instead.
+
+    Args:
+        person: has the age.
+        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+    """
+    # Of a face of eight they are a third as deep as at thirty, at eighty nearly twice.
+    age = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 1.9)))
+    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
+    cheek = np.exp(-(((x - 0.44) / 0.19) ** 2) - ((y + 0.42) / 0.24) ** 2)
+    inner = np.exp(-(((x - 0.28) / 0.13) ** 2) - ((y + 0.38) / 0.2) ** 2)
+    jowl = np.exp(-(((x - 0.5) / 0.22) ** 2) - ((y + 0.85) / 0.25) ** 2)
+    return np.asarray(age * (1 - 0.9 * np.clip(cheek + inner + jowl, 0, 1)))
+
+
+def lasting(place: Floats, eye: Floats) -> Floats:
+    """float64[h, w]: where folds of expressions stay with the years, 0 to 1: brow and eyes first.
+
+    Args:
+        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+    """
+    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
+    brow = smooth(0.15, 0.3, y)
+    feet = np.exp(-(((x - 0.5) / 0.14) ** 2) - ((y + 0.04) / 0.2) ** 2)
+    between = np.exp(-((x / 0.12) ** 2) - ((y - 0.14) / 0.14) ** 2)
+    fold = np.clip(-wrinkles.laugh_fold(place, eye)[0] / wrinkles.DEPTH, 0, 1)
+    return np.asarray(0.22 + 0.78 * np.clip(brow + feet + between + fold, 0, 1))
+
+
+def between_brows(place: Floats, eye: Floats) -> Floats:
+    """float64[h, w]: where a frown's lines stay alone, 0 to 1: lines across them would be a grid.
+
+    Args:
+        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+    """
+    x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
+    return np.asarray(smooth(0.17, 0.10, x) * smooth(_FROWN_ENDS[1], _FROWN_ENDS[0], y))
+
+
+@dataclass
+class Wrinkles:
+    """What expressions fold.
+
+    Attributes:
+        pictures: of masks and of the sets' normals, by file name.
+        sets: the file of each set.
+        still: float32[h, w], how deep in a fold a texel of the face at rest is, 0 to 1.
+    """
+
+    pictures: dict[str, Floats]
+    sets: dict[int, str]
+    still: Floats
+
+
+def head_wrinkles(
+    person: Person,
+    head: Part,
+    positions: Floats,
+    eye: Floats,
+    units: dict[str, Expression],
+    size: int,
+) -> Wrinkles:
+    """Pictures of masks and of the sets' normals, which are differences from flat ones.
+
+    Args:
+        person: has the age.
+        head: the mesh, not subdivided.
+        positions: float64[v, 3] of its vertices, decimetres.
+        eye: float64[3], the left eye's middle.
+        units: what each raw control does, by its name.
+        size: texels of a side.
+    """
+    uvs = head.polygons.uvs
+    raster = Raster(head.polygons, uvs, size)
+    place = raster.image(positions)
+    folds = wrinkles.vertex_folds(head, uvs, positions, units)
+    strength = fold_strength(person, place, eye)
+    out = Wrinkles({}, {}, np.zeros((size, size), np.float32))
+    deeper = float(np.interp(person.age, (8, 30, 70), (0.6, 1.0, 1.4)))
+    stays = float(np.interp(person.age, STAYS[0], STAYS[1]))
+    for number in wrinkles.SETS:
+        names = wrinkles.masks_of(number)
+        depths = np.column_stack([folds[name][:, 0] for name in names])
+        shares = raster.image(depths)
+        whole = raster.image(np.asarray(sum(folds[name] for name in names)))
+        out.sets[number] = f"head_normal_wm{number}.png"
+        height = wrinkles.fold_heights(whole, strength)
+        if wrinkles.FROWN in names:
+            height *= 1 - smooth(*_FROWN_ENDS, place[..., 1] - eye[1])
+        if wrinkles.SMILE in names:
+            fold, there = wrinkles.laugh_fold(place, eye)
+            height += deeper * fold
+            for side, sign in (("L", 1), ("R", -1)):
+                own = shares[..., names.index(wrinkles.SMILE[:-1] + side)]
+                np.maximum(own, there * smooth(-0.01, 0.01, sign * place[..., 0]), out=own)
+        masks = np.clip(shrunk(shares, MASK_SIZE), 0, 1)
+        out.pictures |= {f"{name}_msk.png": masks[..., k] for k, name in enumerate(names)}
+        normal = wrinkles.normals(height, place)
+        out.pictures[out.sets[number]] = normal - [0, 0, 0.5]
+        deep = np.clip(-height / wrinkles.DEPTH, 0, 1) * lasting(place, eye)
+        if wrinkles.FROWN not in names:
+            deep = deep * (1 - between_brows(place, eye))
+        out.still = np.maximum(out.still, stays * deep.astype(np.float32))
+    return out
+
+
+def paint_head(
+    person: Person,
+    head: Part,
+    positions: Floats,
+    own: Floats,
+    eye: Floats,
+    units: dict[str, Expression],
+    still: Floats,
+    size: int,
+) -> dict[str, Floats]:
+    """Colour, normals and roughness of the head, by file name.
+
+    Args:
+        person: has the colours and the age.
+        head: the mesh, each edge of the base mesh two.
+        positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
+        own: the same on the person, whose form the relief has.
+        eye: float64[3], the left eye's middle.
+        units: what each raw control does, by its name.
+        still: float32[h, w], how deep in a fold a texel is, in a smaller picture.
+        size: texels of a side.
+    """
+    p = head.carry(positions)
+    raster = Raster(head.polygons, head.polygons.uvs, size)
+    texels = Texels(raster, p)
+    face = find_face(head, p, eye, units, DIVIDED)
+    skin = Skin(person, face, texels, eye)
+    creases = enlarged(still, size).ravel()[raster.where]
+    formed = share_at(person.age) * form(head.polygons, head.carry(own), face, texels)
+    files = {
+        "head_color.png": raster.spread(skin.colour(np.maximum(creases, 0.5 * hollows(formed)))),
+        "head_roughness.png": raster.spread(roughness(skin, creases)),
+    }
+    files = {name: filled(image, raster.covered) for name, image in files.items()}
+    files["head_roughness.png"] = shrunk(files["head_roughness.png"], size // 2)
+    files["head_normal.png"] = normals(skin, heights(skin, creases) + formed)
+    return files
+
+
+def flush_masks(head: Part, positions: Floats, eye: Floats) -> dict[str, Floats]:
+    """Where a cheek reddens, by file name.
+
+    Args:
+        head: the mesh, not subdivided.
+        positions: float64[V, 3], all vertices of the base mesh, decimetres.
+        eye: float64[3], the left eye's middle.
+    """
+    x, y, z = (head.carry(positions) - np.array([0, eye[1], eye[2]])).T
+    files = {}
+    raster = Raster(head.polygons, head.polygons.uvs, MASK_SIZE)
+    for side, sign in (("L", 1), ("R", -1)):
+        mask = 0.75 * np.exp(-(((sign * x - 0.42) / 0.25) ** 2) - ((y + 0.36) / 0.2) ** 2)
+        mask *= smooth(-0.6, -0.2, z)
+        files[f"head_flush_{side}.png"] = raster.image(mask[:, None])[..., 0]
+    return files
+
+
+def paint_textures(
+    person: Person,
+    positions: Floats,
+    own: Floats,
+    units: dict[str, Expression],
+    parts: list[Part],
+    largest: int = HEAD_SIZE,
+) -> tuple[dict[str, bytes], dict[str, str]]:
+    """The textures.
+
+    Args:
+        person: has the colours.
+        positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
+        own: the same on the person.
+        units: what each raw control does, by its name.
+        parts: the meshes.
+        largest: no texture has more texels than a square of this side.
+
+    Returns:
+        File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;
+        the roles are color, normal, roughness, normal:<set of wrinkles>, and
+        map:<animated map>, a mask of where that map shows.
+    """
+    coarse = next(part for part in parts if part.name == "head_lod1_mesh")
+    eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
+    eye = eye_parts[0].carry(positions).mean(axis=0)
+    size = max(HEAD_SIZE, largest)
+    folded = head_wrinkles(
+        person, coarse, coarse.carry(positions), eye, units, size // WRINKLE_SHARE
+    )
+    head = next(part for part in parts if part.name == "head_lod0_mesh")
+    files = paint_head(person, head, positions, own, eye, units, folded.still, size)
+    files |= flush_masks(coarse, positions, eye)
+    files |= folded.pictures | {
+        "eye_color.png": paint_eye(person),
+        "shirt_color.png": paint_cloth(person.shirt),
+    }
+    out = {}
+    for lod in (0, 1):
+        for side in "LR":
+            out[f"texture:head_lod{lod}_mesh:map:head_flush_{side}"] = f"head_flush_{side}.png"
+    for number, name in folded.sets.items():
+        for lod in (0, 1):
+            out[f"texture:head_lod{lod}_mesh:normal:{number}"] = name
+    for lod in (0, 1):
+        for role in ("color", "normal", "roughness"):
+            out[f"texture:head_lod{lod}_mesh:{role}"] = f"head_{role}.png"
+        out[f"texture:shirt_lod{lod}_mesh:color"] = "shirt_color.png"
+        for eye_side in ("Left", "Right"):
+            out[f"texture:eye{eye_side}_lod{lod}_mesh:color"] = "eye_color.png"
+    return {name: png(packable(name, image, largest)) for name, image in files.items()}, out
+
+
+def packable(name: str, image: Floats, largest: int) -> Floats:
+    """A picture at the size at which it is kept.
+
+    Half as many texels a side do for an eye as for a head. Where the zip is to hold them, pictures
+    keep seven bits and roughness six: what PNG cannot pack is the noise of the others.
+
+    Args:
+        name: of its file.
+        image: float64[h, w, ...] in [0, 1].
+        largest: no texture has more texels than a square of this side.
+    """
+    out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
+    if largest > 1024 or not name.startswith(("head_", "eye_")):
+        return out
+    steps = 63.75 if "roughness" in name else 127.5  # of both 128 of 255, a flat normal, is one
+    return np.round(out * steps) / steps

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""What an expression does on another person: displacements carried by how each place is shaped.
+
+The data's units fit one build of a face. Where another is half as wide, a lid has half the way; the
+local change of form (Sumner and Popovic, "Deformation Transfer for Triangle Meshes", 2004, as
+a matrix at each vertex) says by how much, and which way it goes. What the jaw takes along
+turns with it by the same angle on everybody, and only what is left of it is carried so: changes of
+form that differ from the edge of a small lip to its chin would turn it inside out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from risorius.author.geometry.polygon_mesh import vertex_normals
+from risorius.author.geometry.rigid import rigid_fit, rigid_way
+
+from .polygons import Floats, Ints
+from .source import BaseMesh
+
+_RINGS = 25  # of vertices about each, over which its change of form is evened out
+_WITH_SKIN = "eyelashes"  # groups that go with the skin that they are on
+_SKIN = "body"
+_JAW = "helper-lower-teeth"
+_REST = 0.005  # decimetres: where the jaw moves a place less than that, it does not carry it
+
+
+class Proportions:
+    """Of one person to another of the same base mesh."""
+
+    def __init__(
+        self, base: BaseMesh, groups: dict[str, Ints], before: Floats, after: Floats
+    ) -> None:
+        """Compares two people.
+
+        Args:
+            base: has the polygons.
+            groups: vertex indices by group of the base mesh.
+            before: float64[V, 3], whom the displacements are of.
+            after: float64[V, 3], whom they are carried to.
+        """
+        self._jaw, self._before, self._after = groups[_JAW], before, after
+        self.changes = np.tile(np.eye(3), (len(before), 1, 1))
+        sums = _edge_sums(base, before, after)
+        skin = _evened(base, groups[_SKIN], *sums)
+        self.changes[groups[_SKIN]] = skin[groups[_SKIN]]
+        for name, vertices in groups.items():
+            if name == _SKIN or name.startswith("joint"):
+                continue
+            if _WITH_SKIN in name:
+                near = _nearest(before[vertices], before[groups[_SKIN]])
+                self.changes[vertices] = skin[groups[_SKIN][near]]
+            else:
+                own, other = (x[vertices].sum(axis=0) for x in sums)
+                self.changes[vertices] = _solved(own[None], other[None])[0]
+
+    def carried(self, displacement: Floats) -> Floats:
+        """float64[V, 3] on the other person.
+
+        Args:
+            displacement: float64[V, 3] on the one.
+        """
+        bone, change = self._before[self._jaw], self.changes[self._jaw[0]]
+        turn, _ = rigid_fit(bone, bone + displacement[self._jaw])
+        shift = displacement[self._jaw].mean(axis=0)
+        own = rigid_way(self._before, bone.mean(axis=0), turn, shift)
+        middle = self._after[self._jaw].mean(axis=0)
+        other = rigid_way(self._after, middle, turn, change @ shift)
+        length = np.einsum("vi,vi->v", own, own) + _REST**2
+        share = np.clip(np.einsum("vi,vi->v", displacement, own) / length, 0, 1)[:, None]
+        way: Floats = np.einsum("vij,vj->vi", self.changes, displacement - share * own)
+        return way + share * other
+
+
+def _edge_sums(base: BaseMesh, before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """float64[V, 3, 3] each: sums of a b^T and of a a^T over the edges a -> b about a vertex, and
+    over its normal as long as an edge."""
+    faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
+    start = np.concatenate(faces)
+    end = np.concatenate([face[1:] + face[:1] for face in faces])
+    mixed = np.zeros((len(before), 3, 3))
+    own = np.zeros((len(before), 3, 3))
+    a, b = before[end] - before[start], after[end] - after[start]
+    for vertex in (start, end):
+        _add(mixed, vertex, b[:, :, None] * a[:, None, :])
+        _add(own, vertex, a[:, :, None] * a[:, None, :])
+    normals = [vertex_normals(p, faces) for p in (before, after)]
+    square = np.trace(own, axis1=1, axis2=2)
+    grown = np.sqrt(np.trace(mixed, axis1=1, axis2=2).clip(0) / np.maximum(square, 1e-30))
+    mixed += (square * grown)[:, None, None] / 2 * normals[1][:, :, None] * normals[0][:, None, :]
+    own += square[:, None, None] / 2 * normals[0][:, :, None] * normals[0][:, None, :]
+    return mixed, own
+
+
+def _evened(base: BaseMesh, vertices: Ints, mixed: Floats, own: Floats) -> Floats:
+    """float64[V, 3, 3]: the changes of form of the skin, evened out over its rings."""
+    there = np.zeros(len(mixed), bool)
+    there[vertices] = True
+    faces = [[c[0] for c in face] for face in base.faces[_SKIN]]
+    start = np.concatenate(faces)
+    end = np.concatenate([face[1:] + face[:1] for face in faces])
+    for _ in range(_RINGS):
+        mixed, own = (_with_neighbours(sums, start, end) for sums in (mixed, own))
+        scale = np.maximum(np.trace(own, axis1=1, axis2=2), 1e-30)[:, None, None]
+        mixed, own = mixed / scale, own / scale
+    out = np.tile(np.eye(3), (len(mixed), 1, 1))
+    out[there] = _solved(mixed[there], own[there])
+    return out
+
+
+def _with_neighbours(sums: Floats, start: Ints, end: Ints) -> Floats:
+    out = sums.copy()
+    _add(out, start, sums[end])
+    _add(out, end, sums[start])
+    return out
+
+
+def _add(sums: Floats, rows: Ints, values: Floats) -> None:
+    """As np.add.at(sums, rows, values), number by number, for which NumPy is far quicker."""
+    wide = sums[0].size
+    places = (rows[:, None] * wide + np.arange(wide)).ravel()
+    np.add.at(sums.reshape(-1), places, values.ravel())
+
+
+def _solved(mixed: Floats, own: Floats) -> Floats:
+    scale = np.trace(own, axis1=1, axis2=2)[:, None, None]
+    steady = own + 1e-6 * scale * np.eye(3)
+    towards = mixed + 1e-6 * scale * np.eye(3)
+    return np.asarray(np.swapaxes(np.linalg.solve(steady, np.swapaxes(towards, 1, 2)), 1, 2))
+
+
+def _nearest(points: Floats, others: Floats) -> Ints:
+    return np.array([int(((others - p) ** 2).sum(axis=1).argmin()) for p in points])

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""The joints that all sample people share, found on the man once: joints.npz, made by
+packaging/find_joints.py, has those of the people as they come; others are kept among the
+user's caches."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from pathlib import Path
+
+from risorius.author import Reference, RigOptions
+from risorius.author.reference import fingerprint
+from risorius.base.errors import ArgumentError
+from risorius.files import fileio
+
+from ..source import SHA256, downloads
+
+SHIPPED = Path(__file__).with_name("joints.npz")
+
+
+def shipped() -> Reference:
+    """The reference of build.RIG, which comes along."""
+    return Reference.read(SHIPPED)
+
+
+def _path(options: RigOptions) -> Path:
+    """Its name begins alike for one version of what it depends on."""
+    known = hashlib.sha256(SHA256.encode() + fingerprint())
+    for entry in sorted(Path(__file__).parent.rglob("*")):
+        if entry.suffix in (".py", ".toml"):
+            known.update(entry.read_bytes())
+    asked = hashlib.sha256(str(options).encode()).hexdigest()
+    return downloads() / f"joints-{known.hexdigest()[:16]}-{asked[:8]}.npz"
+
+
+def kept(options: RigOptions) -> Reference | None:
+    """The reference of these options, if this version of Risorius has made one here.
+
+    Args:
+        options: of the joint rig.
+    """
+    try:
+        return Reference.read(_path(options))
+    except (OSError, ArgumentError):
+        return None
+
+
+def keep(options: RigOptions, reference: Reference) -> None:
+    """Keeps a reference, in place of those of other versions; where it cannot, it is made again.
+
+    Args:
+        options: of the joint rig.
+        reference: of the man.
+    """
+    path = _path(options)
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        version = path.name.rpartition("-")[0]
+        for old in path.parent.glob("joints-*.npz"):
+            if not old.name.startswith(version):
+                old.unlink()
+        fileio.write_bytes(path, reference.to_bytes())

