@@ -241,7 +241,7 @@ def _plant_sample(monkeypatch, tmp_path, dna_file, error=None):
     """A user folder of the extension, and a builder of samples that copies a small face."""
     import shutil
 
-    from risorius import sample
+    import risorius_people as sample
 
     calls = []
 
@@ -268,7 +268,7 @@ def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
 
 def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
     """What the status bar shows, and Esc: the task of the operator, without a window."""
-    from risorius import sample
+    import risorius_people as sample
 
     operator = scene.submodule("ui.file.import_operators").RISORIUS_OT_add_character
     task, said = None, []
@@ -300,7 +300,7 @@ def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
 
 
 def test_add_face_without_data_says_why(monkeypatch, tmp_path, dna_file):
-    from risorius import sample
+    import risorius_people as sample
 
     _plant_sample(monkeypatch, tmp_path, dna_file, sample.SourceError("No data is there."))
     before = scene.counts()
@@ -310,7 +310,7 @@ def test_add_face_without_data_says_why(monkeypatch, tmp_path, dna_file):
 
 
 def test_add_face_offline_says_what_to_do_and_no_path(monkeypatch, tmp_path, dna_file):
-    from risorius import sample
+    import risorius_people as sample
 
     calls = _plant_sample(monkeypatch, tmp_path, dna_file)
     monkeypatch.setattr(sample, "is_fetched", lambda: False)
