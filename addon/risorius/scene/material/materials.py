@@ -199,9 +199,13 @@ def _add_attributes(
         return set()
     if plan.kind == "eyes":
         _add(mesh, eye_mouth_materials.EYES, _eye_coordinates(plan.positions))
-    elif plan.kind == "teeth":
+    elif plan.kind in ("teeth", "tongue", "gum"):
         unit = frame.unit if frame else float(np.ptp(plan.positions[:, 0]))
-        _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
+        if plan.kind == "teeth":
+            _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
+        behind: Attribute = mesh.attributes.new(eye_mouth_materials.MOUTH, "FLOAT", "POINT")
+        away = plan.positions[:, 1] - plan.positions[:, 1].min()
+        behind.data.foreach_set("value", (away / max(unit, 1e-9)).astype(np.float32))
     elif plan.kind == "skin" and frame is not None:
         _add_border(mesh, plan.positions, frame)
         return _add_areas(mesh, plan.positions, frame)
