@@ -127,6 +127,37 @@ def test_roots_stand_between_the_cards_too(haired):
     assert np.ptp(roots @ along / (along @ along)) > 0.3
 
 
+_DARK = 0.1  # as stored: of a picture of brows
+
+
+def test_strands_of_brows_are_no_black_wires(tmp_path):
+    """They are about as light as the cards whose place they take, and have thin roots."""
+    dna = small_face()
+    looks.set_meshes(dna, {"head_lod0_mesh": dna.meshes[0], "brows_lod0_mesh": cards(0)})
+    dna.metadata = {
+        "texture:brows_lod0_mesh:color": "hair.png",
+        "hair:brows_lod0_mesh": f"rows={ROWS}",
+    }
+    (tmp_path / "brows.dna").write_bytes(dna.to_bytes())
+    looks.write_image(tmp_path / "hair.png", np.full((4, 4, 4), [_DARK] * 3 + [1.0], np.float32))
+    head, item = scene.meshes(scene.load(tmp_path / "brows.dna")).values()
+    head.hide_render = True
+    setup, _ = looks.stage([item], 24, samples=8)
+    setup.render.film_transparent = True
+    cards_look = looks.render(setup, tmp_path / "cards.png").reshape(-1, 4)
+    before = set(bpy.data.objects)
+    bpy.ops.risorius.set_strands()
+    (thing,) = set(bpy.data.objects) - before
+    found = looks.render(setup, tmp_path / "strands.png").reshape(-1, 4)
+    light = [np.average(p[:, :3].mean(axis=1) ** 2.2, weights=p[:, 3]) for p in (cards_look, found)]
+    assert 0.6 < light[1] / light[0] < 1.5
+    thing.hide_viewport = False
+    curves = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    radii = np.array([p.radius for p in curves.points])
+    first = [c.first_point_index for c in curves.curves]
+    assert (radii[first] < 0.6 * np.maximum.reduceat(radii, first)).all()
+
+
 RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm; strands of a lock, locks of a card
 
 

@@ -48,6 +48,25 @@ def kinds_file(tmp_path):
     return _save(tmp_path, looks.every_kind())
 
 
+@pytest.mark.parametrize("kind", ["teeth", "tongue", "gums"])
+def test_what_lies_deep_in_a_mouth_is_dark_without_shadows(tmp_path, kind):
+    """Else molars are a white wall behind the corner of an open mouth."""
+    face = small_face()
+    mesh = looks.copy_mesh(face.meshes[1], scale=2.0)
+    points = mesh.positions.copy()
+    points[:, 2] = 8.0 - 1.6 * np.abs(points[:, 0] - points[:, 0].mean())  # a bow, as an arch is
+    mesh.positions = points
+    looks.set_meshes(face, {"head_lod0_mesh": face.meshes[0], f"{kind}_lod0_mesh": mesh})
+    head, item = scene.meshes(scene.load(_save(tmp_path, face))).values()
+    head.hide_render = True
+    setup, (x, _) = looks.stage([item], 24, samples=4)
+    _emit_only(item.data.materials[0])
+    light = looks.render(setup, tmp_path / "arch.png")[..., :3].mean(axis=2)
+    aside = np.abs(x - x.mean()) / np.ptp(x)
+    middle, ends = (np.median(light[m][light[m] > 0]) for m in (aside < 0.06, aside > 0.36))
+    assert ends < 0.6 * middle
+
+
 @pytest.mark.parametrize("simple", [False, True])
 def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
     rig = scene.load(kinds_file, use_simple_materials=simple)

@@ -9,31 +9,37 @@ from support.faces import _mesh as fine_mesh
 from support.faces import small_face
 
 SKIN = (0.8, 0.5, 0.2)  # of the colour texture, as it is stored
+HAIR, THIN = (0.5, 0.4, 0.4), 0.15  # colour of brows, and how much of their cards is hair
 
 
 def _face(tmp_path, color=True):
-    """A head with a mask and perhaps a colour, a fine eye, lashes before it, a film before all."""
+    """A head with a mask and perhaps a colour, a fine eye, lashes before it, a film before all;
+    brows of thin grey hair before the eye."""
     face = small_face()
     random = np.random.default_rng(5)
     place = np.array([3.0, 160.0, 12.0])
     eye = fine_mesh(random, (41, 41), 1.2, place, (3,), ())
     patch = face.meshes[1]
-    names = ("head", "eyeLeft", "eyelashes", "eyeshell", "teeth")
+    names = ("head", "eyeLeft", "eyelashes", "eyeshell", "teeth", "brows")
     meshes = (
         face.meshes[0],
         eye,
         looks.copy_mesh(eye, (0, 0, 0.3)),
         looks.copy_mesh(eye, (0, 0, 0.2)),
         patch,
+        looks.copy_mesh(eye, (0, 0, 0.4)),
     )
     looks.set_meshes(face, {f"{n}_lod0_mesh": m for n, m in zip(names, meshes, strict=True)})
     face.metadata = {"texture:head_lod0_mesh:map:flush": "flush.png"}
+    if color:
+        face.metadata = {**face.metadata, "texture:brows_lod0_mesh:color": "hair.png"}
     if color:
         face.metadata = {**face.metadata, "texture:head_lod0_mesh:color": "skin.png"}
     path = tmp_path / "face.dna"
     face.save(str(path))
     folder = tmp_path / "face_textures"
     folder.mkdir()
+    looks.write_image(folder / "hair.png", looks.halves((*HAIR, 0.0), (*HAIR, 2 * THIN)))
     looks.write_image(folder / "flush.png", np.zeros((8, 8, 3), np.float32))
     looks.write_image(folder / "skin.png", np.full((8, 8, 3), SKIN, np.float32))
     return path
@@ -77,6 +83,15 @@ def test_the_active_picture_is_the_colour(color, tmp_path):
         assert nodes.active.type in ("TEX_NOISE", "TEX_VORONOI")
 
 
+def test_hair_is_as_light_and_as_thin_as_its_picture(tmp_path):
+    rig = scene.load(_face(tmp_path))
+    shown = {m.name: m.data.materials[0].diffuse_color[:] for m in scene.meshes(rig).values()}
+    brows = next(color for name, color in shown.items() if "brows" in name)
+    linear = [((x + 0.055) / 1.055) ** 2.4 for x in HAIR]
+    assert brows[:3] == pytest.approx(linear, abs=0.02)
+    assert brows[3] == pytest.approx(THIN, abs=0.03)
+
+
 def test_replacing_the_file_keeps_the_iris(tmp_path):
     path = _face(tmp_path)
     rig = scene.load(path)
@@ -118,6 +133,7 @@ shot("head", "TEXTURE", 0)
 shot("plain", "TEXTURE", -1)
 shot("skin", "MATERIAL", -1)
 shot("lashes", "MATERIAL", 1, 2)
+shot("brows", "MATERIAL", 1, 5)
 """
 
 
@@ -142,3 +158,4 @@ def test_solid_view_shows_the_gaze_and_no_black_head(tmp_path):
     assert shots["skin"][0].min() > 0.3
     lashes, white = shots["lashes"][1].mean(), shots["eye"][1].mean()
     assert 0.5 * white < lashes < 0.95 * white  # what is behind them is seen
+    assert 0.8 * white < shots["brows"][1].mean() < 0.98 * white  # no black speck

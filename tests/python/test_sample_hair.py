@@ -20,7 +20,7 @@ from risorius_people.hair.growth import curled, eased, grow
 from risorius_people.hair.strips import card_faces, card_vertices, make_strips
 from risorius_people.hair.surface import Roots, Surface, nearest_places
 from risorius_people.paint.atlas import TILES
-from risorius_people.paint.places import hairline_height
+from risorius_people.paint.places import brow_density, brow_ridge, hairline_height
 from risorius_people.paint.strands import paint_strands
 from risorius_people.polygons import Polygons, subdivide
 
@@ -54,6 +54,15 @@ def test_hair_grows_within_the_hairline():
     forehead = np.array([[0.4, 0.75, 0.0]])
     assert hairline_height(forehead) > 0.05
     assert hairline_height(forehead, recession=1.0) < 0
+
+
+def test_a_brow_begins_with_few_hairs():
+    eye, along = 0.3, np.array([-0.03, 0.06, 0.12, 0.3])
+    points = np.column_stack([along * 0.44 + eye - 0.185, brow_ridge(along), 0 * along])
+    found = brow_density(points, eye)
+    assert found[0] < 0.01
+    assert 0.1 < found[1] < 0.6 * found[3]
+    assert found[2] < 0.9 * found[3]
 
 
 def test_roots_are_apart_and_on_the_skin(ball):

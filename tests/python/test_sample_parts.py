@@ -3,13 +3,14 @@
 
 import numpy as np
 import pytest
+import risorius
 import sample_people
 from risorius.author.geometry import rigid
 from risorius.author.geometry.polygon_mesh import polygon_mesh
 from risorius_people import askew, build, people, proportions, source
 from risorius_people.eyes import with_eyeballs
 from risorius_people.paint.layout import islands
-from risorius_people.parts import clothes, lips, teeth
+from risorius_people.parts import clothes, lips, teeth, tongue
 from risorius_people.polygons import edges_of
 
 MM = 0.01  # of the data's decimetres
@@ -91,6 +92,49 @@ def test_extra_lips_rest_on_each_other(data, base, man):
     # The data's own are open.
     raw = lips.gap_across(mouth, mouth.operator.apply(full.positions))[1]
     assert raw.max() > 0.5 * MM
+
+
+def _tongue_in_lip(dna, poses):
+    """mm: how much higher the lower lip is than the underside of the tongue on it, by pose.
+
+    Args:
+        dna: a sample person.
+        poses: names of raw controls without prefix and side -> values, of each pose.
+    """
+    rig = risorius.Rig(dna)
+    surface = risorius.Surface(dna, rig)
+    names = [name.removeprefix("CTRL_expressions.") for name in dna.raw_control_names]
+    head, tongue = (list(dna.mesh_names).index(f"{n}_lod0_mesh") for n in ("head", "tongue"))
+
+    def posed(mesh, values):
+        raw = [values.get(name, values.get(name[:-1], 0.0)) for name in names]
+        return surface.positions(np.array(raw, np.float32), mesh) * surface.mm
+
+    rest = posed(head, {})
+    wide, _, front = posed(tongue, {}).max(axis=0)
+    near = (np.abs(rest[:, 0]) < 0.5 * wide) & (np.abs(rest[:, 2] - front) < 15)
+    lower = near & (rest[:, 1] - posed(head, {"jawOpen": 1})[:, 1] > 10)  # what the jaw takes along
+    out = []
+    for values in poses:
+        lip, points = posed(head, values)[lower], posed(tongue, values)
+        sinks = []
+        for x in np.linspace(-0.4 * wide, 0.4 * wide, 9):
+            column = lip[np.abs(lip[:, 0] - x) < 1.5]
+            ridge = column[column[:, 1].argmax()]
+            over = points[np.abs(points - ridge)[:, [0, 2]].max(axis=1) < 2.5]
+            sinks.append(ridge[1] - over[:, 1].min())
+        out.append(max(sinks))
+    return out
+
+
+def test_extra_a_tongue_that_is_put_out_lies_on_the_lip():
+    """A smile lifts the lower lip by six millimetres: the tongue must not come through it."""
+    dna = sample_people.assembled("man")[0]
+    lifts = [{}, {"mouthCornerPull": 0.5}, *({name: 1} for name in tongue.LIFTING)]
+    for jaw, most in ((0.3, 6.8), (0.6, 4.5), (1, 2)):  # soft flesh gives way by some millimetres
+        poses = [lift | {"tongueOut": 1, "jawOpen": jaw} for lift in lifts]
+        for lift, deep in zip(lifts, _tongue_in_lip(dna, poses), strict=True):
+            assert -4 < deep < most, (lift, jaw)
 
 
 def test_extra_a_shirt_has_a_collar_and_one_hem(base):

@@ -27,6 +27,7 @@ from .paint.layout import packed
 from .part import Part
 from .parts.clothes import shirt
 from .parts.teeth import mouth_parts
+from .parts.tongue import over_lip
 from .people import MAN, Person
 from .polygons import (
     Floats,
@@ -325,7 +326,11 @@ def assemble(
     positions, joints, units = body.positions, body.joints, body.units
     places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]
     correctives: dict[tuple[str, ...], Floats] = {}
-    for found in (ex.corrective_displacements(units, places), body.closing, body.eye_correctives):
+    ways = {name: unit.displacement for name, unit in units.items()}
+    tongue = over_lip(ways, positions, body.groups["helper-tongue"], body.lip_rim)
+    for found in (
+        ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
+    ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
     # It adds no shape: the turns of the joints of its factors do not add up, and it mends that.
     correctives[ex.CLOSED] = np.zeros_like(positions)

@@ -12,7 +12,7 @@ from risorius.base.easing import smooth_step
 from . import expressions as ex
 from .eyes import Eyes, with_eyeballs
 from .parts.clothes import collar_heights
-from .parts.lips import Mouth, sealed
+from .parts.lips import Mouth, rims, sealed
 from .people import MAN, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions
@@ -197,6 +197,7 @@ class Body:
         units: what each raw control does.
         closing: float64[V, 3], what closes lips that the jaw has opened, by their two raw controls.
         eyes: where they are and how their lids rest.
+        lip_rim: int64[n], vertices of the lower lip at the upper one.
         eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
         man: the man's, for the man himself this.
         weights: float64[V, 9], skin weights.
@@ -227,7 +228,10 @@ class Body:
         self.eyes.open(self.positions, wide)
         jaw_open = self.carried(source.face_unit("jawOpen", count))
         pucker = self.carried(source.face_unit("mouthPucker", count))
-        self.positions = sealed(Mouth(base, pucker, jaw_open), self.positions)
+        mouth = Mouth(base, pucker, jaw_open)
+        self.positions = sealed(mouth, self.positions)
+        lower = rims(mouth, mouth.operator.apply(self.positions))[1]
+        self.lip_rim = lower[lower < count]  # the first vertices are those of the base mesh
         show_upper_teeth(self.positions, groups, jaw_open, size)
         self.joints = joint_positions(self.positions, groups, size)
         if other is None:

@@ -34,13 +34,14 @@ class Kind(NamedTuple):
     # Light goes from fibre to fibre where they lie close; single ones over skin are as the picture
     # shows them, and fibres that let light through would be darker there.
     dense: bool
+    root: float = 1.0  # radius at the root itself, of `radius`, which a strand has a fifth farther
     coil: Coil | None = None
     lock: int = 1  # strands that begin and go together
 
 
 _KINDS = {  # by what the name of a mesh begins with
     "hair": Kind(32, 0.00008, 0.0015, 0.45, 0.45, 0.005, True),
-    "brows": Kind(5, 0.000055, 0.0004, 0.35, 0.3, 0.0013, False),
+    "brows": Kind(5, 0.00005, 0.0004, 0.35, 0.3, 0.0013, False, 0.45),
     "beard": Kind(12, 0.00005, 0.0015, 0.5, 0.9, 0.0022, False),
     "eyelashes": Kind(3, 0.00006, 0.0003, 0.25, 0.0, 0.0, False),
 }

@@ -12,6 +12,7 @@ from ..base.blender_types import MeshObject, NodeTree, Socket
 
 PLACE = "strand_uv"  # attribute of the curves: where in the picture their colour is
 _DEEPER = 1.6  # exponent of the colour of fibres that lie close
+_FAINTER = 0.75  # of single ones over skin: light passes through them, and a dark one is no wire
 
 
 def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
@@ -41,10 +42,19 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
         image.image.alpha_mode = "CHANNEL_PACKED"
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         colour = image.outputs["Color"]
-        tree.links.new(colour, shader.inputs["Base Color"])
+        seen = colour if dense else _raised(tree, colour, _FAINTER)
+        tree.links.new(seen, shader.inputs["Base Color"])
     if dense:
         _add_fibre(tree, colour)
     return material
+
+
+def _raised(tree: NodeTree, colour: Socket, exponent: float) -> Socket:
+    """A colour to the power of an exponent: below 1 dark ones become lighter than light ones do."""
+    node = tree.nodes.new("ShaderNodeGamma")
+    node.inputs["Gamma"].default_value = exponent
+    tree.links.new(colour, node.inputs["Color"])
+    return node.outputs["Color"]
 
 
 def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
@@ -63,10 +73,7 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
     fibre.inputs["IOR"].default_value = 1.3  # oiled: with 1.55 light from behind makes it grey
     if colour is not None:
         # Light goes through several fibres: what the picture shows is what they give together.
-        deep = tree.nodes.new("ShaderNodeGamma")
-        deep.inputs["Gamma"].default_value = _DEEPER
-        tree.links.new(colour, deep.inputs["Color"])
-        tree.links.new(deep.outputs["Color"], fibre.inputs["Color"])
+        tree.links.new(_raised(tree, colour, _DEEPER), fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"
     tree.links.new(fibre.outputs[0], cycles.inputs["Surface"])

@@ -18,6 +18,7 @@ TREE = "Risorius Strands"
 CARDS = "Cards"  # input of the modifier: the mesh that is followed
 _OF_A_TURN = 7  # points of a strand that winds
 _MOST_POINTS = 100
+_ROOT = 0.2  # of its length: up to there a strand grows to its full radius
 _MOST_SLID = 0.9  # rows: farther, a card that bends would be left
 
 
@@ -226,6 +227,9 @@ def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> S
     along = g.node("GeometryNodeSplineParameter").outputs["Factor"]
     radius = kind.radius / unit
     thick = g.math("MULTIPLY", g.math("SUBTRACT", 1.0, g.math("POWER", along, 3.0)), radius)
+    if kind.root < 1.0:
+        grown = g.math("MULTIPLY_ADD", along, (1.0 - kind.root) / _ROOT, kind.root)
+        thick = g.math("MULTIPLY", thick, g.math("MINIMUM", grown, 1.0))
     sized = g.node("GeometryNodeSetCurveRadius", {"Curve": trimmed.outputs[0], "Radius": thick})
     return sized.outputs[0]
 

@@ -11,6 +11,7 @@ from .nodes import Color, Graph, Value
 
 EYES = "risorius_eye"  # mesh attribute: x and height over the eye's radius, 1 on the front half
 TEETH = "risorius_teeth"  # mesh attribute: place along the arch in teeth, height from the bite
+MOUTH = "risorius_mouth"  # mesh attribute: how far behind the mesh's front, in eyes' distances
 
 # Linear colours, from the look of the thing.
 _SCLERA, _SCLERA_RIM, _VEIN = (0.72, 0.66, 0.62), (0.56, 0.39, 0.34), (0.48, 0.14, 0.11)
@@ -21,6 +22,9 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
+# Lips and cheeks keep light from what lies deep in a mouth. Where nothing casts shadows (Material
+# Preview, exports) molars would be as bright as incisors, a white wall behind the corner.
+_SHADED = ((0.16, (1.0,) * 3), (0.36, (0.5, 0.44, 0.4)), (0.62, (0.2, 0.15, 0.13)))
 _CORNEA_IOR = 1.376
 _COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
 
@@ -175,8 +179,10 @@ def teeth(graph: Graph, look: Look) -> None:
             relief = graph.math("MULTIPLY_ADD", gum, 0.25, arch)
             if not look.simple:
                 normal = graph.bump(relief, look.unit * 0.05, normal, 0.8)
-    graph.set(Base_Color=color, Roughness=_film(graph, look, 0.18, 0.42))
-    graph.set(Coat_Weight=0.35, Coat_Roughness=0.12, Specular_Ior_Level=0.5)
+    shade = _shade(graph)
+    color = graph.mix(1.0, color, shade, "MULTIPLY")
+    graph.set(Base_Color=color, Roughness=_film(graph, look, 0.18, 0.42), Coat_Roughness=0.12)
+    _shine(graph, shade, coat=0.35, gloss=0.5)
     if not look.simple:
         graph.set(Subsurface_Weight=0.35, Subsurface_Scale=look.unit * 0.02)
         graph.set(Subsurface_Radius=(1.0, 0.8, 0.6), Normal=normal)
@@ -189,7 +195,7 @@ def tongue(graph: Graph, look: Look) -> None:
         graph: of the material, with its shader and its output.
         look: sizes, textures and areas of the mesh.
     """
-    _flesh(graph, look, (_TONGUE_DARK, _TONGUE), 46.0)
+    _flesh(graph, look, (_TONGUE_DARK, _TONGUE), 46.0, _shade(graph))
 
 
 def gum(graph: Graph, look: Look) -> None:
@@ -201,18 +207,37 @@ def gum(graph: Graph, look: Look) -> None:
     """
     in_eye = any(word in look.base.lower() for word in ("cartilage", "caruncle"))
     tones = (_CARUNCLE_DARK, _CARUNCLE) if in_eye else (_GUM_DARK, _GUM)
-    _flesh(graph, look, tones, 0.0 if in_eye else 26.0)
+    _flesh(graph, look, tones, 0.0 if in_eye else 26.0, None if in_eye else _shade(graph))
 
 
-def _flesh(graph: Graph, look: Look, tones: tuple[Color, Color], grain: float) -> None:
+def _shade(graph: Graph) -> Socket:
+    """The share of the light that comes so deep into a mouth, a colour."""
+    return graph.ramp(graph.attribute_number(MOUTH), *_SHADED)
+
+
+def _shine(graph: Graph, shade: Socket | None, coat: float, gloss: float) -> None:
+    """A wet coat and what is under it, both duller where it is dark."""
+    if shade is None:
+        graph.set(Coat_Weight=coat, Specular_Ior_Level=gloss)
+        return
+    light, _, _ = graph.split_color(shade)
+    graph.set(Coat_Weight=graph.math("MULTIPLY", light, coat))
+    graph.set(Specular_Ior_Level=graph.math("MULTIPLY", light, gloss))
+
+
+def _flesh(
+    graph: Graph, look: Look, tones: tuple[Color, Color], grain: float, shade: Socket | None
+) -> None:
     points = graph.rest_points(look.extent)
     picture = look.image("color")
     mottled = graph.noise(points, 6.0 / look.unit, detail=5.0, roughness=0.6)
     color = graph.ramp(mottled, (0.3, tones[0]), (0.7, tones[1]))
     if picture is not None:
         color = graph.image(picture, label="Colour").outputs["Color"]
-    graph.set(Base_Color=color, Roughness=_film(graph, look, 0.32, 0.55))
-    graph.set(Coat_Weight=0.5, Coat_Roughness=0.16, Specular_Ior_Level=0.45)
+    if shade is not None:
+        color = graph.mix(1.0, color, shade, "MULTIPLY")
+    graph.set(Base_Color=color, Roughness=_film(graph, look, 0.32, 0.55), Coat_Roughness=0.16)
+    _shine(graph, shade, coat=0.5, gloss=0.45)
     if look.simple:
         return
     # Papillae are cells; a caruncle is smooth but for some hills.

@@ -99,6 +99,7 @@ class Images:
         self.made = made
         self.troubles: list[str] = []
         self._loaded: dict[tuple[str, bool], bpy.types.Image | None] = {}
+        self._small: dict[Path, NDArray[np.float32] | None] = {}
         self._room, self._files = 0, 0  # bytes, of all images that were loaded
 
     def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
@@ -114,6 +115,16 @@ class Images:
         if key not in self._loaded:
             self._loaded[key] = self._read(path, data)
         return self._loaded[key]
+
+    def small(self, path: Path) -> NDArray[np.float32] | None:
+        """float32[TILE, TILE, 4]: a file's stored numbers; None where it cannot be read.
+
+        Args:
+            path: of the file.
+        """
+        if path not in self._small:
+            self._small[path] = _small_copy(path)
+        return self._small[path]
 
     def _read(self, path: Path, data: bool) -> bpy.types.Image | None:
         try:

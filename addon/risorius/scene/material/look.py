@@ -64,6 +64,11 @@ class Look:
         """
         return self.images.load(self.found.of(self.base, role), data)
 
+    def small(self, role: str) -> NDArray[np.float32] | None:
+        """float32[h, w, 4]: the stored numbers of a role's image, made small; None without it."""
+        path = self.found.of(self.base, role)
+        return None if path is None else self.images.small(path)
+
     def is_offset(self, role: str) -> bool:
         """Whether the wrinkle map of this role holds differences about 0.5."""
         if role not in self.offsets:

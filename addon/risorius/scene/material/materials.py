@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from ...logic.character import plans
 from ...logic.material import animated_maps, skin_folds, texture_search
 from ..base.blender_types import ArmatureObject, Attribute, MeshObject
-from . import cloth_material, eye_mouth_materials, hair_material, nodes, skin_material
+from . import card_color, cloth_material, eye_mouth_materials, hair_material, nodes, skin_material
 from .image_loading import Images
 from .look import Look
 from .nodes import Graph
 
 # What the solid view shows. Lashes are cards: opaque ones would cover the lids with black bands.
+# Those of a picture have its colour and opacity, see card_color.
 _VIEW_COLORS = {
     "skin": (0.62, 0.36, 0.27, 1.0),
     "eyes": (0.75, 0.70, 0.66, 1.0),
@@ -67,6 +68,9 @@ def build_materials(
             look = _look(plan, mesh, rig, frame, uses, areas, found, images, simple)
             look.border = skin_material.BORDER in item.data.attributes
             by_base[mesh.base] = _build(plan, look, made)
+            if mesh.kind in ("lashes", "hair"):
+                shown = card_color.color_of(look, mesh)
+                by_base[mesh.base][0].diffuse_color = shown or _VIEW_COLORS[mesh.kind]
         for material in by_base[mesh.base]:
             item.data.materials.append(material)
         if mesh.kind == "eyes" and eye_mouth_materials.EYES in item.data.attributes:
@@ -195,9 +199,13 @@ def _add_attributes(
         return set()
     if plan.kind == "eyes":
         _add(mesh, eye_mouth_materials.EYES, _eye_coordinates(plan.positions))
-    elif plan.kind == "teeth":
+    elif plan.kind in ("teeth", "tongue", "gum"):
         unit = frame.unit if frame else float(np.ptp(plan.positions[:, 0]))
-        _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
+        if plan.kind == "teeth":
+            _add(mesh, eye_mouth_materials.TEETH, _tooth_coordinates(plan.positions, unit))
+        behind: Attribute = mesh.attributes.new(eye_mouth_materials.MOUTH, "FLOAT", "POINT")
+        away = plan.positions[:, 1] - plan.positions[:, 1].min()
+        behind.data.foreach_set("value", (away / max(unit, 1e-9)).astype(np.float32))
     elif plan.kind == "skin" and frame is not None:
         _add_border(mesh, plan.positions, frame)
         return _add_areas(mesh, plan.positions, frame)

@@ -65,7 +65,7 @@ def brows(surface: Surface, person: Person) -> Strips:
     roots = surface.scattered(density, _BROW_SPACING, random)
     along, _ = brow_place(roots.of(surface.man), surface.eye)
     n = len(roots)
-    long = np.interp(along, [0.0, 0.15, 0.5, 1.0], [0.062, 0.085, 0.085, 0.055])
+    long = np.interp(along, [0.0, 0.18, 0.5, 1.0], [0.05, 0.085, 0.085, 0.055])
     size = 0.85 if person.gender == "female" else 1.0
     size *= float(np.interp(person.age, (8, 20, 60, 80), (0.8, 1.0, 1.05, 1.3)))
     long = long * surface.scale * size * random.uniform(0.8, 1.15, n)

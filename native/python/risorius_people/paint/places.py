@@ -143,7 +143,7 @@ def brow_density(points: Floats, eye: float) -> Floats:
     along, height = brow_place(points, eye)
     across = height / brow_width(np.clip(along, 0, 1))
     body = 1 - smooth_step((np.abs(across) - 0.45) / 0.75)
-    ends = smooth_step((along + 0.02) / 0.11) * (1 - smooth_step((along - 0.86) / 0.18))
+    ends = smooth_step((along + 0.03) / 0.2) * (1 - smooth_step((along - 0.86) / 0.18))
     return np.asarray(body * ends * (points[:, 2] > -0.35))
 
 

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The colour of hair in the solid view: as light and as thin as the picture on its cards is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...logic.character import plans
+from .look import Look
+
+Color = tuple[float, float, float, float]
+
+_SAMPLES = 4096  # corners of cards, between which the picture is looked at
+_INWARD = (0.0, 0.35, 0.65)  # shares of the way from a corner to the middle of its face
+_LEAST = 0.02  # opacity: below it nobody sees where hair is
+
+
+def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
+    """Mean colour and mean opacity of a picture where cards show it.
+
+    The solid view has one colour for each material. Cards of one dark, half clear colour are
+    blocks and specks in it: a card is clear for the most part, and overlaps many others.
+
+    Args:
+        look: of the mesh's material.
+        mesh: cards of hair.
+
+    Returns:
+        Linear colour and opacity, 0 to 1; None without a picture that has an opacity.
+    """
+    picture = look.image("color")
+    if picture is None or picture.channels != 4 or mesh.uvs is None or not len(mesh.face_starts):
+        return None
+    pixels = look.small("color")
+    if pixels is None:
+        return None
+    found = _at(pixels, _places(mesh.uvs, mesh.face_starts))
+    opacity = float(found[:, 3].mean())
+    if opacity <= 0.0:
+        return None
+    seen = (found[:, :3] * found[:, 3:]).sum(axis=0) / found[:, 3].sum()
+    linear = np.where(seen < 0.04045, seen / 12.92, ((seen + 0.055) / 1.055) ** 2.4)
+    red, green, blue = (float(x) for x in linear)
+    return red, green, blue, max(opacity, _LEAST)
+
+
+def _places(uvs: NDArray[np.float32], starts: NDArray[np.int32]) -> NDArray[np.float64]:
+    """float64[n, 2]: places of the picture within the faces, as many on each.
+
+    Args:
+        uvs: float32[N, 2] per corner.
+        starts: int32[F], first corner of each face; none is empty.
+    """
+    counts = np.diff(np.append(starts, len(uvs)))
+    middles = np.add.reduceat(uvs.astype(np.float64), starts) / counts[:, None]
+    some = np.unique(np.linspace(0, len(uvs) - 1, min(_SAMPLES, len(uvs))).astype(np.int64))
+    middle = np.repeat(middles, counts, axis=0)[some]
+    return np.concatenate([uvs[some] + share * (middle - uvs[some]) for share in _INWARD])
+
+
+def _at(pixels: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float32]:
+    """float32[n, 4]: the texels at places of a picture, which repeats."""
+    height, width = pixels.shape[:2]
+    column, row = (
+        (np.nan_to_num(places[:, axis]) % 1.0 * size).astype(np.int64).clip(0, size - 1)
+        for axis, size in ((0, width), (1, height))
+    )
+    return pixels[row, column]
