@@ -8,7 +8,7 @@ import bpy
 from . import native
 from .language import tables
 from .scene.animation import layer_properties, range_properties
-from .scene.base import compat, console
+from .scene.base import compat, console, session
 from .scene.character import gaze_settings
 from .scene.life import handlers
 from .scene.live import capture
@@ -172,6 +172,7 @@ def unregister() -> None:
     if _idle:
         bpy.utils.unregister_class(_idle.pop())
         words.forget_language()
+        session.end("unregister")
         return
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
@@ -202,3 +203,4 @@ def unregister() -> None:
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     words.forget_language()
+    session.end("unregister")

@@ -12,7 +12,7 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layer_mixing, layers, tweak_guard
-from ..base import console, parts, sharing, written
+from ..base import console, parts, session, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import board, lods, outlines, rig_placement, runtime, shown_keys
 from ..frame import (
@@ -42,6 +42,7 @@ _state: dict[str, Any] = {
 
 @persistent
 def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
+    session.end("frame")
     timing.begin()
     caches.look()
     if not _state["rendering"] and not native.problem():
@@ -225,6 +226,7 @@ def _loaded(*_arguments: object) -> None:
     """After load: Blender calls no update handler when it evaluates a file for the first time."""
     context = current_context()
     layer = context.view_layer
+    session.end("load")
     migrations.forget()
     if not native.problem():
         console.say(*migrations.bring_up_all())
@@ -249,6 +251,7 @@ def _restored(*_arguments: object) -> None:
     Nothing is read here: until the next update the pose bones of objects that undo brought back
     point to bones that are no more, and Blender dies of a look at them.
     """
+    session.end("undo")
     written.forget()
     lateness.forget()
     layer_mixing.forget()
@@ -271,6 +274,7 @@ def _restored(*_arguments: object) -> None:
 @persistent
 def _before_restoring(*_arguments: object) -> None:
     """Before load, undo and redo: what is freed by them is let go."""
+    session.end("free")
     controls_ahead.close()
 
 
