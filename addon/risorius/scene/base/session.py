@@ -22,8 +22,10 @@ from typing import Generic, Literal, Protocol, TypeVar, cast, get_args
 
 # free: before undo, redo and load, which free what Blender's pointers point to.
 # undo: after undo and redo. load: after a file was loaded. frame: before a frame is evaluated.
-# unregister: ends all but what has the word quit, which is work of the user's.
-End = Literal["free", "undo", "load", "frame", "unregister", "quit"]
+# rewrite: what was written is to be written anew, whatever is there.
+# unregister: ends all but what has the word quit, which ends with Blender: work of the user's, and
+# what is read from the extension's own files.
+End = Literal["free", "undo", "load", "frame", "rewrite", "unregister", "quit"]
 
 Kept = TypeVar("Kept")
 Key = TypeVar("Key")
