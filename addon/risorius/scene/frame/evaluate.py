@@ -17,7 +17,7 @@ import numpy as np
 
 from ... import native
 from ..animation import layers
-from ..base import drivers, parts, saved, written
+from ..base import drivers, parts, saved, session, written
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import lods, rig_placement, runtime
 from . import (
@@ -32,8 +32,9 @@ from . import (
     timing,
 )
 
-_pauses: list[bool] = []
-_ahead: dict[int, _Ahead] = {}  # deforming armature -> what was done before this frame
+_pauses = session.value("evaluate.pauses", 0, ("unregister",))
+# Deforming armature -> what was done before this frame.
+_ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
 
 
 @dataclass(frozen=True)
@@ -54,15 +55,15 @@ class _Ahead:
 @contextmanager
 def paused() -> Iterator[None]:
     """While this lasts no frame and no update brings a face up: what is read is read by others."""
-    _pauses.append(True)
+    _pauses.now += 1
     try:
         yield
     finally:
-        _pauses.pop()
+        _pauses.now = max(0, _pauses.now - 1)  # the add-on may have gone meanwhile
 
 
 def is_paused() -> bool:
-    return bool(_pauses)
+    return _pauses.now > 0
 
 
 def evaluate_all(depsgraph: Depsgraph, force: bool = False) -> None:
@@ -85,7 +86,6 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
         scene: at its new time.
         rendering: whether the frame is rendered.
     """
-    _ahead.clear()
     if native.problem() or is_paused() or not controls_ahead.is_needed():
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
