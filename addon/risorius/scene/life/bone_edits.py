@@ -12,10 +12,12 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..base import parts
+from ..base import parts, session
 
 # Session uid of an armature -> its bones' names, marks and places at rest, as last seen.
-_seen: dict[int, tuple[Sequence[object], bytes]] = {}
+_seen: dict[int, tuple[Sequence[object], bytes]] = session.table(
+    "bone_edits.seen", ("undo", "load")
+)
 
 
 def forget() -> None:
