@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...logic.base.space import world_matrices
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 from ..character import lods, meshes, runtime
 
 Doubles = NDArray[np.float64]
-_skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = {}
+_skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = session.table(
+    "displacement.skins", ("load",)
+)
 _MOST = 24  # meshes whose weights are kept
 
 
