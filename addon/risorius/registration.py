@@ -74,7 +74,20 @@ CLASSES = (
 )
 
 
-_idle: list[type] = []  # what is registered where another copy is in use
+# What they keep is read from files of the extension, which are the same until Blender ends.
+session.adopt(
+    ("quit",),
+    native.addon_version,
+    native.website,
+    native.regions,
+    native.live_sources,
+    tables.controls,
+    tables.languages,
+    tables.search_words,
+    tables.translation,
+)
+# What is registered where another copy is in use.
+_idle: list[type] = session.keep("registration.idle", list, ("unregister",))
 
 
 def _window_properties() -> dict[str, object]:
