@@ -87,12 +87,6 @@ _stacks: dict[int, Stack] = session.table("layer_mixing.stacks", ("undo", "load"
 _versions: dict[int, int] = session.table("layer_mixing.versions", ("undo", "load"))
 
 
-def forget() -> None:
-    """Drop all that is compiled: after load and undo, session uids may mean others."""
-    _stacks.clear()
-    _versions.clear()
-
-
 def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
     """Drop what is kept of characters and actions that are gone. Args: there  control armatures."""
     kept = {controls.session_uid for controls in there if controls is not None}

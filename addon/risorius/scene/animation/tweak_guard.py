@@ -54,13 +54,6 @@ _known: set[int] = session.keep("tweak_guard.known", set, ("undo", "load"))
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
-def forget() -> None:
-    """After load and undo session uids may mean others, and other keys are there."""
-    _hands.clear()
-    _known.clear()
-    _troubles.clear()
-
-
 def trouble(controls: ArmatureObject) -> str:
     """Why the last key went nowhere, or "". Args: controls  a control armature."""
     return _troubles.get(controls.session_uid, "")

@@ -242,8 +242,3 @@ def _edited(image: bpy.types.Image, spaces: bool = True) -> bool:
     noted = _noted(image)[1]
     space = "" if spaces else noted.partition("\n")[0]
     return image.is_dirty or noted != _state(image, space)
-
-
-def forget() -> None:
-    """Drop the bytes that are held."""
-    _kept.clear()

@@ -55,11 +55,6 @@ class _Places:
 _places: dict[int, _Places] = session.table("board.places", ("undo", "load"))
 
 
-def forget() -> None:
-    """After load and undo session uids may mean others."""
-    _places.clear()
-
-
 def note_edit() -> None:
     """Something was edited: a handle may have got a constraint."""
     for places in _places.values():

@@ -332,9 +332,3 @@ def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> fl
     yaw, pitch = yaw_pitch(turned)
     angle = abs(yaw if horizontal else pitch)
     return angle if angle > np.radians(2.0) else DEFAULT_EYE_ANGLE
-
-
-def forget() -> None:
-    """Drop all compiled data."""
-    _cache.clear()
-    written.forget()

@@ -17,11 +17,6 @@ from . import armatures
 _counts: dict[int, tuple[int, int]] = session.table("shown_keys.counts", ("undo", "load"))
 
 
-def forget() -> None:
-    """After load and undo session uids may mean others."""
-    _counts.clear()
-
-
 def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
     """Let the animation editors show keys that a face just got.
 

@@ -116,11 +116,6 @@ def words(rig: ArmatureObject) -> str:
     )
 
 
-def forget() -> None:
-    """After load nothing is known of what is there."""
-    _late.clear()
-
-
 def are_late(scene: bpy.types.Scene) -> bool:
     """Whether a scene has such caches."""
     return any(_late.get(rig.session_uid) for rig in parts.rigs() if scene in rig.users_scene)

@@ -62,12 +62,6 @@ _noted: dict[int, _Seen] = session.table("applied_transforms.noted", ("undo", "l
 _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "load"))
 
 
-def forget() -> None:
-    """After load and undo: what was seen before says nothing about what is there."""
-    _noted.clear()
-    _said.clear()
-
-
 def last_said(rig: ArmatureObject) -> Sentence | None:
     """The sentence on the last step that was taken back. Args: rig  deforming armature."""
     return _said.get(rig.session_uid)

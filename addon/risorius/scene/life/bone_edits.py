@@ -20,11 +20,6 @@ _seen: dict[int, tuple[Sequence[object], bytes]] = session.table(
 )
 
 
-def forget() -> None:
-    """After load: what was seen before says nothing about what is there."""
-    _seen.clear()
-
-
 def is_edited(armature: bpy.types.Armature) -> bool:
     """Whether an armature has other bones than when this was last asked, or was never asked.
 

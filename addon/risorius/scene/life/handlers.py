@@ -25,8 +25,7 @@ from ..frame import (
     look_masks,
     timing,
 )
-from ..why import causes, displacement, heat
-from ..why import present as why_present
+from ..why import heat
 from . import applied_transforms, bone_edits, duplicates, migrations, repair
 
 
@@ -239,7 +238,6 @@ def _loaded(*_arguments: object) -> None:
     context = current_context()
     layer = context.view_layer
     session.end("load")
-    migrations.forget()
     if not native.problem():
         console.say(*migrations.bring_up_all())
     if layer is not None and not native.problem() and parts.rigs():
@@ -264,16 +262,7 @@ def _restored(*_arguments: object) -> None:
     point to bones that are no more, and Blender dies of a look at them.
     """
     session.end("undo")
-    written.forget()
-    lateness.forget()
-    layer_mixing.forget()
-    shown_keys.forget()
-    tweak_guard.forget()
-    applied_transforms.forget()
-    bone_edits.forget()
-    causes.forget()
     heat.follow_undo()
-    board.forget()
     if native.problem():
         return
     there = [c for c in map(parts.controls_of, parts.rigs()) if c is not None]
@@ -286,7 +275,6 @@ def _restored(*_arguments: object) -> None:
 def _before_restoring(*_arguments: object) -> None:
     """Before load, undo and redo: what is freed by them is let go."""
     session.end("free")
-    controls_ahead.close()
 
 
 @persistent
@@ -374,11 +362,3 @@ def unregister() -> None:
         present = getattr(bpy.app.handlers, name)
         if handler in present:
             present.remove(handler)
-    controls_ahead.close()
-    lateness.forget()
-    layer_mixing.forget()
-    sharing.forget()
-    causes.forget()
-    displacement.forget()
-    why_present.forget()
-    runtime.forget()

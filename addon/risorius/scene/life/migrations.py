@@ -75,11 +75,6 @@ def newer(rig: ArmatureObject) -> str:
     )
 
 
-def forget() -> None:
-    """After load session uids may mean others."""
-    _said.clear()
-
-
 def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     """It says what it needs; a baked one keeps what it silenced by name."""
     changed = []

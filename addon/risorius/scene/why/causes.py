@@ -318,9 +318,3 @@ def mesh_of(item: object) -> int:
     """The index in the file of a mesh object of a character, -1 for any other object."""
     get = getattr(item, "get", None)
     return int(get(parts.MESH, -1)) if get is not None else -1
-
-
-def forget() -> None:
-    """Let go of all that was found: after load and undo, session uids may mean others."""
-    _found.clear()
-    _fired.clear()

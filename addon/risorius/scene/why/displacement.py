@@ -68,11 +68,6 @@ def _skin(live: runtime.Runtime, mesh: int) -> Skin:
     )
 
 
-def forget() -> None:
-    """Let go of all skins."""
-    _skins.clear()
-
-
 def moves(live: runtime.Runtime, joints: NDArray[np.float32]) -> Doubles:
     """By which matrix each joint takes its skin along.
 

@@ -233,7 +233,6 @@ def end_all() -> None:
 
 def follow_undo() -> None:
     """After undo and redo: views show colours where there are some, and else do not."""
-    _shown.clear()
     if any(parts.HEAT in rig for rig in parts.rigs()):
         heat_views.show()
         watch()
@@ -302,8 +301,3 @@ def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -
     places = layers.places(controls) if controls is not None else ()
     name = places[int(heat.what)].name if int(heat.what) < len(places) else heat.what
     return told("Added by layer {name}", name=name)
-
-
-def forget() -> None:
-    """Session uids may mean others."""
-    _shown.clear()

@@ -125,8 +125,3 @@ def name_of(live: runtime.Runtime, control: int) -> str:
         return shape
     factors = [str(names.short(c)) for c in factors_of(live).get(control, ())]
     return " x ".join(factors) or str(names.name(control))
-
-
-def forget() -> None:
-    """Let go of all names."""
-    _known.clear()
