@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the add-on remembers ends with the event that its entry names."""
+
+import gc
+import inspect
+import sys
+import weakref
+
+import addon_utils
+import bpy
+import pytest
+from conftest import MODULE
+from support import scene
+from support.extension_steps import of_ours
+
+WORDS = ("free", "undo", "load", "frame", "rewrite", "unregister", "quit")
+
+
+def _session():
+    return scene.submodule("scene.base.session")
+
+
+def _undo():
+    bpy.ops.ed.undo()
+
+
+def _redo():
+    bpy.ops.ed.redo()
+
+
+def _load():
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+
+def _frame():
+    bpy.context.scene.frame_set(bpy.context.scene.frame_current + 1)
+
+
+@pytest.fixture
+def probes():
+    """An entry for each word, with something in it."""
+    session = _session()
+    kept = {word: session.keep(f"probe.{word}", list, (word,)) for word in WORDS}
+    yield kept
+    for word in WORDS:
+        session._entries.pop(f"probe.{word}")
+
+
+@pytest.mark.parametrize(
+    ("event", "ended"),
+    [
+        (_frame, {"frame"}),
+        (_undo, {"free", "undo"}),
+        (_redo, {"free", "undo"}),
+        (_load, {"free", "undo", "load"}),
+    ],
+)
+def test_an_event_ends_its_words(probes, event, ended):
+    for _ in range(2):
+        bpy.ops.object.empty_add()
+        bpy.ops.ed.undo_push(message="step")
+    if event is _redo:
+        _undo()
+    for kept in probes.values():
+        kept.append(1)
+    event()
+    gone = {word for word, kept in probes.items() if not kept}
+    assert gone - {"rewrite"} == ended
+
+
+def _fill(dna_file):
+    """A session with a face that is keyed, asked why, copied and shown as a heat map."""
+    rig = scene.load(dna_file, "LIVE")
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    scene.set_controls(rig, jawOpen=0.5, mouthCornerPullL=0.4)
+    assert bpy.ops.risorius.key(region="jaw") == {"FINISHED"}
+    assert len(scene.submodule("scene.why.causes").strongest(rig)) == 1
+    assert bpy.ops.risorius.heat(kind="POSE") == {"FINISHED"}
+    assert bpy.ops.risorius.copy_pose() == {"FINISHED"}
+    scene.submodule("ui.why.panel")._ask_soon()
+    _frame()
+    return rig
+
+
+def _held(session, *words):
+    return {name for name in session.held() if set(words) & set(session.ends_of(name))}
+
+
+def test_a_load_leaves_nothing_of_the_file_before(dna_file):
+    session = _session()
+    rig = _fill(dna_file)
+    live = weakref.ref(scene.submodule("scene.character.runtime").of(rig))
+    full = _held(session, "load")
+    assert {"present.known", "displacement.skins", "why.panel.soon", "written.inputs"} <= full
+    _load()
+    assert _held(session, "load", "undo", "free") == set()
+    bpy.ops.object.empty_add()
+    bpy.context.view_layer.update()
+    gc.collect()
+    assert live() is None
+    panel = scene.submodule("ui.why.panel")
+    panel._ask_soon()  # Blender drops the timer with the file: it is asked for again
+    assert bpy.app.timers.is_registered(panel._ask)
+
+
+def _timers():
+    """The functions of the add-on that Blender calls later."""
+    modules = [m for name, m in sys.modules.items() if name.startswith(f"{MODULE}.")]
+    functions = {f for m in modules for f in vars(m).values() if inspect.isfunction(f)}
+    return {f.__name__ for f in functions if bpy.app.timers.is_registered(f)}
+
+
+def test_registered_again_it_is_as_new(dna_file):
+    session = _session()
+    first = (set(session.held()), of_ours(), _timers())
+    _fill(dna_file)
+    assert "runtime.cache" in session.held()
+    addon_utils.disable(MODULE)
+    assert {name for name in session.held() if "quit" not in session.ends_of(name)} == set()
+    assert not any(of_ours().values())
+    assert _timers() == set()
+    addon_utils.enable(MODULE)
+    again = _session()
+    assert (set(again.held()), of_ours(), _timers()) == first
+    scene.set_controls(bpy.data.objects["Small_rig"], jawOpen=1.0)
+    assert "runtime.cache" in again.held()
