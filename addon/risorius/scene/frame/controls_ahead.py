@@ -27,6 +27,9 @@ from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement
 from . import caches, lateness
 
+# Blender counts one reference too few to temporary data, and would free it twice. The newest that
+# was seen to do so; in a newer one the references are counted each time.
+MISCOUNTED_UNTIL = (5, 2)
 _FAR = 1_000_000  # frame of the first marker: no animation gets there
 _HANDLERS = (
     "frame_change_pre",
@@ -59,9 +62,8 @@ class _Stage:
         data = bpy.data.temp_data()  # which the stubs take for what it gives
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
-        # Blender counts one reference to this too few, and would free it twice: ours and that of
-        # what gave it, with the one that is asked here, are three.
-        if sys.getrefcount(self._file) < 3:
+        # Ours, that of what gave it, and the one that is asked here are three.
+        if bpy.app.version[:2] <= MISCOUNTED_UNTIL or sys.getrefcount(self._file) < 3:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
         self._scene = self._file.scenes.new("Risorius")
         for number, item in enumerate(roots):
