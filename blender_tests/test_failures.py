@@ -231,7 +231,7 @@ def test_damaged_data_in_the_blend_is_said_once(dna_file, mode, capsys):
     rig = scene.load(dna_file, mode)
     text = rig["risorius_dna"]
     text["risorius_bytes"] = b"damaged"
-    scene.submodule("scene.character.runtime").forget()
+    scene.submodule("scene.character.runtime").forget_unused(())
     for frame in (2, 3, 4):
         bpy.context.scene.frame_set(frame)
     assert capsys.readouterr().out.count("cannot be read") == 1

@@ -244,7 +244,7 @@ def test_a_blend_whose_dna_was_tampered_with(how, dna_file, mode, tmp_path, caps
         _tamper(rig["risorius_dna"], how)
     blend = str(tmp_path / "tampered.blend")
     bpy.ops.wm.save_as_mainfile(filepath=blend)
-    scene.submodule("scene.character.runtime").forget()
+    scene.submodule("scene.character.runtime").forget_unused(())
     bpy.ops.wm.open_mainfile(filepath=blend)
     rig = bpy.data.objects["Small_rig"]
     bpy.context.view_layer.objects.active = rig
@@ -281,7 +281,7 @@ def test_a_small_stream_that_unfolds_to_a_thousand_times_its_size(said, begins, 
     if said in length:
         text["risorius_length"] = length[said]
     del whole
-    scene.submodule("scene.character.runtime").forget()
+    scene.submodule("scene.character.runtime").forget_unused(())
     tracemalloc.start()
     bpy.context.scene.frame_set(2)
     peak = tracemalloc.get_traced_memory()[1]

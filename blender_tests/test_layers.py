@@ -262,7 +262,7 @@ def test_a_render_shows_what_the_viewport_shows(blinker, tmp_path):
         bpy.ops.render.render(animation=True)
     finally:
         bpy.app.handlers.frame_change_post.remove(note)
-    scene.submodule("scene.animation.layer_mixing").forget()
+    scene.submodule("scene.base.session").end("undo")
     wanted = {frame: _raw(blinker, frame) for frame in (15, 17)}
     for frame, raw in wanted.items():
         np.testing.assert_array_equal(seen[frame], raw)
@@ -768,7 +768,7 @@ def test_every_setting_is_heeded_at_once(rig, setting, value):
     setattr(entry, setting, value)
     changed = np.array([_raw(rig, f) for f in frames])
     assert np.abs(changed - before).max() > 0.01
-    scene.submodule("scene.animation.layer_mixing").forget()
+    scene.submodule("scene.base.session").end("undo")
     np.testing.assert_array_equal([_raw(rig, f) for f in frames], changed)
     assert other.name == "Layer.001"
 

@@ -135,7 +135,7 @@ def test_a_rendered_frame_is_whole_and_the_view_is_solo_again(rig, dna_file, tmp
     scene.set_controls(rig, jawOpen=0.7, mouthCornerPullL=0.6)
     bpy.ops.risorius.solo(control=JAW)
     graph = bpy.context.evaluated_depsgraph_get()
-    evaluate.evaluate(rig, graph, rendering=True)  # what a frame of a render does
+    evaluate.evaluate(rig, graph, evaluate.Moment.RENDER)  # what a frame of a render does
     bpy.context.view_layer.update()
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE

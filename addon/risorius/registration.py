@@ -8,7 +8,7 @@ import bpy
 from . import native
 from .language import tables
 from .scene.animation import layer_properties, range_properties
-from .scene.base import compat, console
+from .scene.base import compat, console, session
 from .scene.character import gaze_settings
 from .scene.life import handlers
 from .scene.live import capture
@@ -74,7 +74,20 @@ CLASSES = (
 )
 
 
-_idle: list[type] = []  # what is registered where another copy is in use
+# What they keep is read from files of the extension, which are the same until Blender ends.
+session.adopt(
+    ("quit",),
+    native.addon_version,
+    native.website,
+    native.regions,
+    native.live_sources,
+    tables.controls,
+    tables.languages,
+    tables.search_words,
+    tables.translation,
+)
+# What is registered where another copy is in use.
+_idle: list[type] = session.keep("registration.idle", list, ("unregister",))
 
 
 def _window_properties() -> dict[str, object]:
@@ -172,6 +185,7 @@ def unregister() -> None:
     if _idle:
         bpy.utils.unregister_class(_idle.pop())
         words.forget_language()
+        session.end("unregister")
         return
     if bpy.app.timers.is_registered(_refresh_once):
         bpy.app.timers.unregister(_refresh_once)
@@ -202,3 +216,4 @@ def unregister() -> None:
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)
     words.forget_language()
+    session.end("unregister")

@@ -20,7 +20,7 @@ import bpy
 MODULE = "bl_ext.user_default.risorius"
 
 
-def _of_ours():
+def of_ours():
     """Everything of the add-on that this process can see."""
     handlers = [
         name
@@ -73,7 +73,7 @@ def install(package):
         filepath=package, repo="user_default", enable_on_install=True
     )
     bpy.ops.wm.save_userpref()
-    return _of_ours()
+    return of_ours()
 
 
 def use(path):
@@ -89,7 +89,7 @@ def use(path):
     bpy.ops.wm.save_as_mainfile(filepath=str(Path(path).with_suffix(".blend")))
     import risorius
 
-    return {**_of_ours(), "moved": moved, "wheel": risorius.__file__}
+    return {**of_ours(), "moved": moved, "wheel": risorius.__file__}
 
 
 def add(_nothing=""):
@@ -125,7 +125,7 @@ def disable(_nothing=""):
     """As a user does it: the check box in the preferences."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     bpy.ops.wm.save_userpref()
-    return _of_ours()
+    return of_ours()
 
 
 def look(blend):
@@ -133,7 +133,7 @@ def look(blend):
     bpy.ops.wm.open_mainfile(filepath=blend)
     bpy.context.scene.frame_set(3)
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
-    return {**_of_ours(), "meshes": len([o for o in bpy.data.objects if o.parent == rig])}
+    return {**of_ours(), "meshes": len([o for o in bpy.data.objects if o.parent == rig])}
 
 
 def remove(_nothing=""):
@@ -142,7 +142,7 @@ def remove(_nothing=""):
     names = [r.module for r in bpy.context.preferences.extensions.repos]
     bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="risorius")
     bpy.ops.wm.save_userpref()
-    return _of_ours()
+    return of_ours()
 
 
 STEPS = {

@@ -2,7 +2,6 @@
 """Words in panels and dialogs: whether they fit, and what a number or an empty field stands for."""
 
 import textwrap
-from functools import cache, lru_cache
 from typing import Any
 
 import blf
@@ -12,13 +11,15 @@ from .. import native
 from ..language import tables
 from ..language.tables import CONTEXT
 from ..logic.base.sentences import Sentence
+from ..scene.base import session
 from .blender_types import Context, Icon, UILayout
 
 NAMES = "Names"  # the context of names of things, in which nothing is translated
 _SIDEBAR = 280  # pixels that Blender gives the sidebar at first
 _EDGES = 36  # of them the tabs and the panel's margins
 _MARGIN = 12  # around the text of a label
-_language = {"locale": "", "given": ""}  # Blender's of now; the language that it has our words of
+# locale: Blender's of now; given: the language that it has our words of.
+_language = session.keep("words.language", lambda: {"locale": "", "given": ""}, ("unregister",))
 
 
 class Ruler:
@@ -39,7 +40,9 @@ class Ruler:
         return width_of(text, self._points, self._font) <= self._room
 
 
-@lru_cache(maxsize=2048)  # a panel asks for the names of all sliders each time it is drawn
+@session.cached(
+    ("unregister",), 2048
+)  # a panel asks for the names of all sliders each time it is drawn
 def width_of(text: str, points: float, font: str = "") -> float:
     """Pixels that a text takes in buttons and labels, at an interface scale of 1.
 
@@ -81,7 +84,7 @@ def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
     layout.prop(owner, name, text="", icon="VIEWZOOM", **placeholder)
 
 
-@cache
+@session.cached(("unregister",))
 def _has_placeholder() -> bool:
     """Whether fields of this Blender can say what they are for."""
     functions: Any = bpy.types.UILayout.bl_rna.functions  # pyright: ignore  the stub has none

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from typing import NamedTuple
 
 from . import slider_words
@@ -97,16 +96,18 @@ class Parted(NamedTuple):
     more: list[Row]
 
 
-@cache
 def table() -> Mapping[str, tuple[str, ...]]:
     """Region -> names of controls without their prefix, both sides of each, in their order."""
-    return {region: tuple(_both_sides(names)) for region, names in _FIRST.items()}
+    return _TABLE
 
 
 def _both_sides(names: Sequence[str]) -> list[str]:
     return [
         name.replace("*", side) for name in names for side in (("L", "R") if "*" in name else ("",))
     ]
+
+
+_TABLE = {region: tuple(_both_sides(names)) for region, names in _FIRST.items()}
 
 
 def part(rows: Sequence[Row], region: str) -> Parted:

@@ -11,8 +11,10 @@ from ..base.face_regions import FaceRegions
 _OTHER = {"Left": "Right", "Right": "Left"}
 _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
 # Upper and lower lip or teeth, the inner and outer part, a phase: as they end the names.
-_WORDS = {"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "}
-_WORDS |= {"Ph": "Phase ", "Fwd": "Forward"}
+_WORDS = {
+    **{"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "},
+    **{"Ph": "Phase ", "Fwd": "Forward"},
+}
 _SHORT = re.compile(
     r"\b[UD](?=$|IN$|OUT$|C$)|(?<=\b[UD])(IN|OUT|C)$|\b(IN|OUT)$|\bPh(?=\d$)|\bFwd\b"
 )

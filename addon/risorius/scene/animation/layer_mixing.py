@@ -22,7 +22,7 @@ from ...logic.animation import clip_units as clip_logic
 from ...logic.animation import layer_rules as logic
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import Sentence, told
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 from . import clip_actions, layers
@@ -81,14 +81,10 @@ class Stack:
     kept: Kept = field(default_factory=Kept)
 
 
-_stacks: dict[int, Stack] = {}  # session uid of a control armature -> Stack
-_versions: dict[int, int] = {}  # session uid of an action -> how often it was edited
-
-
-def forget() -> None:
-    """Drop all that is compiled: after load and undo, session uids may mean others."""
-    _stacks.clear()
-    _versions.clear()
+# Session uid of a control armature -> Stack.
+_stacks: dict[int, Stack] = session.table("layer_mixing.stacks", ("undo", "load"))
+# Session uid of an action -> how often it was edited.
+_versions: dict[int, int] = session.table("layer_mixing.versions", ("undo", "load"))
 
 
 def forget_unused(there: Iterable[ArmatureObject | None]) -> None:

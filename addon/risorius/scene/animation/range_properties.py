@@ -10,7 +10,7 @@ import bpy
 
 from ... import native
 from ...language import tables
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 
 ROWS = parts.RANGES
@@ -19,7 +19,8 @@ SWITCH = "risorius_use_range"
 SOURCE = "risorius_range_source"
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 _LEAST, _MOST = 0.1, 1.9  # difference of extreme and neutral, as risorius.ranges has them
-_changes = {"count": 0}  # of any range, since Blender started
+# How often any range changed.
+_changes = session.value("range_properties.changes", 0, ("unregister",))
 
 
 def _touch(_self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
@@ -67,12 +68,12 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
 
 def touch() -> None:
     """Say that ranges may have changed: by a hand, undo, or another file."""
-    _changes["count"] += 1
+    _changes.now += 1
 
 
 def changes() -> int:
     """How often ranges may have changed; whoever keeps some compares it."""
-    return _changes["count"]
+    return _changes.now
 
 
 def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:

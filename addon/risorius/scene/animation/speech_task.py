@@ -20,10 +20,13 @@ from ... import native
 from ...logic.animation import recogniser
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
+from ..base import session
 from ..base.task import Task
 
 _LOOK_EVERY = 3.0  # seconds
-_looked: dict[str, float] = {"lacks": False, "until": 0.0}
+_looked: dict[str, float] = session.keep(
+    "speech_task.looked", lambda: {"lacks": False, "until": 0.0}, ("unregister",)
+)
 
 
 class SpeechTask(Task["native.Clip"]):

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...logic.base.errors import FaceError
-from ..base import compat, parts
+from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject
 from ..character import board, runtime
 from . import clip_actions, curve_colours, tweaks
@@ -46,16 +46,12 @@ class _Hand:
     places: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
-_hands: dict[int, _Hand] = {}  # session uid of a control armature -> what its user moved
-_known: set[int] = set()  # session uids of those looked at since load or undo
-_troubles: dict[int, str] = {}  # session uid of one -> why its last key went nowhere
-
-
-def forget() -> None:
-    """After load and undo session uids may mean others, and other keys are there."""
-    _hands.clear()
-    _known.clear()
-    _troubles.clear()
+# Session uid of a control armature -> what its user moved.
+_hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
+# Session uids of those looked at since load or undo.
+_known: set[int] = session.keep("tweak_guard.known", set, ("undo", "load"))
+# Session uid of one -> why its last key went nowhere.
+_troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
 
 def trouble(controls: ArmatureObject) -> str:

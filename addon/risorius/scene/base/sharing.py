@@ -12,13 +12,14 @@ from typing import Any
 
 import bpy
 
-from . import parts, storage
+from . import parts, session, storage
 from .blender_types import ArmatureObject, Node, NodeTree, current_context
 
 DIGEST = "risorius_sha256"  # on an image: hash of the packed file
 STATE = "risorius_state"  # on an image: colour space, way of alpha and size of the packed file
 
-_kept: dict[str, bytes] = {}  # digest -> bytes of an image that several characters show
+# Digest -> bytes of an image that several characters show.
+_kept: dict[str, bytes] = session.table("sharing.kept", ("unregister",))
 
 
 def mark(image: bpy.types.Image, digest: str = "") -> None:
@@ -241,8 +242,3 @@ def _edited(image: bpy.types.Image, spaces: bool = True) -> bool:
     noted = _noted(image)[1]
     space = "" if spaces else noted.partition("\n")[0]
     return image.is_dirty or noted != _state(image, space)
-
-
-def forget() -> None:
-    """Drop the bytes that are held."""
-    _kept.clear()

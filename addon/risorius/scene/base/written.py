@@ -8,13 +8,20 @@ from __future__ import annotations
 
 import bpy
 
-inputs: dict[int, object] = {}  # deforming armature -> what its face was last evaluated from
-places: dict[int, object] = {}  # deforming armature -> bytes of the matrix that was last written
-weights: dict[int, object] = {}  # shape key -> bytes of the channel weights of its sum
+from . import session
+
+# Deforming armature -> what its face was last evaluated from.
+inputs: dict[int, object] = session.table("written.inputs", ("rewrite", "undo", "load"))
+# Deforming armature -> bytes of the matrix that was last written.
+places: dict[int, object] = session.table("written.places", ("rewrite", "undo", "load"))
+# Shape key -> bytes of the channel weights of its sum.
+weights: dict[int, object] = session.table("written.weights", ("rewrite", "undo", "load"))
 # Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
-bone_writers: dict[int, object] = {}
-unheard: set[int] = set()  # shape keys whose points were last written without an update
-_refused: set[int] = set()  # objects of overrides that Blender lets nobody write to
+bone_writers: dict[int, object] = session.table("written.bone_writers", ("rewrite", "undo", "load"))
+# Shape keys whose points were last written without an update.
+unheard: set[int] = session.keep("written.unheard", set, ("rewrite", "undo", "load"))
+# Objects of overrides that Blender lets nobody write to.
+_refused: set[int] = session.keep("written.refused", set, ("rewrite", "undo", "load"))
 
 
 def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
@@ -51,7 +58,4 @@ def is_refused(item: bpy.types.ID) -> bool:
 
 def forget() -> None:
     """Let the next evaluation write everything: after undo, load and changes of shape mode."""
-    for kept in (inputs, places, weights, bone_writers):
-        kept.clear()
-    unheard.clear()
-    _refused.clear()
+    session.end("rewrite")

@@ -17,7 +17,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ...logic.character import board_fit, board_layout
-from ..base import compat, parts
+from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject
 from . import runtime
 
@@ -51,12 +51,8 @@ class _Places:
     moved: list[tuple[str, list[tuple[int, int]]]] | None = None
 
 
-_places: dict[int, _Places] = {}  # session uid of a control armature -> its places
-
-
-def forget() -> None:
-    """After load and undo session uids may mean others."""
-    _places.clear()
+# Session uid of a control armature -> its places.
+_places: dict[int, _Places] = session.table("board.places", ("undo", "load"))
 
 
 def note_edit() -> None:

@@ -19,7 +19,7 @@ from ...logic.base import names
 from ...logic.base.sentences import told
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import board_layout, board_table, plans
-from ..base import console, parts, saved, storage, written
+from ..base import console, parts, saved, session, storage, written
 from ..base.blender_types import ArmatureObject, MeshObject
 
 # The bones of the control armature beside those of a face board.
@@ -160,7 +160,7 @@ def _chain(dna: native.Dna, space: Space, joint: int) -> Chain:
     return Chain(joints, angles, space.points(dna.neutral_joint_translations[joints]))
 
 
-_cache: dict[tuple[str, float], Runtime | None] = {}
+_cache: dict[tuple[str, float], Runtime | None] = session.table("runtime.cache", ("unregister",))
 _LEAST_UNIT, _MOST_UNIT = 1e-9, 1e9  # metres per Blender unit that a scene can have
 
 
@@ -332,9 +332,3 @@ def _response(runtime: Runtime, control: int, side: str, horizontal: bool) -> fl
     yaw, pitch = yaw_pitch(turned)
     angle = abs(yaw if horizontal else pitch)
     return angle if angle > np.radians(2.0) else DEFAULT_EYE_ANGLE
-
-
-def forget() -> None:
-    """Drop all compiled data."""
-    _cache.clear()
-    written.forget()

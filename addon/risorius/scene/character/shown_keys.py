@@ -9,17 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..base import compat, parts
+from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject, Context, current_context
 from . import armatures
 
 # Uid of a control armature -> uid of the action that it plays, and how many keys its sliders have.
-_counts: dict[int, tuple[int, int]] = {}
-
-
-def forget() -> None:
-    """After load and undo session uids may mean others."""
-    _counts.clear()
+_counts: dict[int, tuple[int, int]] = session.table("shown_keys.counts", ("undo", "load"))
 
 
 def show(controls: ArmatureObject, paths: Iterable[str]) -> None:

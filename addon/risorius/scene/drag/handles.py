@@ -9,6 +9,7 @@ import numpy as np
 
 from ... import native
 from ..animation import keying
+from ..base import session
 from ..base.blender_types import ArmatureObject, Context
 from ..character import board, runtime
 from . import kept_points, sliders
@@ -16,7 +17,9 @@ from .skin import Point, Skin
 
 COUNT = 18
 _SHARE = 0.1  # of the farthest that a slider moves a handle: what moves it less is not its own
-_placed: WeakKeyDictionary[native.Surface, list[Point]] = WeakKeyDictionary()
+_placed: WeakKeyDictionary[native.Surface, list[Point]] = session.keep(
+    "handles.placed", WeakKeyDictionary, ("unregister",)
+)
 
 
 def of(surface: native.Surface) -> list[Point]:

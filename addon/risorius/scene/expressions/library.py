@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +19,7 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.names import printable
 from ...logic.base.sentences import told
+from ..base import session
 from ..base.blender_types import Context
 
 RISORIUS, LIBRARY, FILE = "RISORIUS", "LIBRARY", "FILE"
@@ -120,7 +120,7 @@ def of_folder(where: Path) -> tuple[list[tuple[Path, native.Expression]], list[s
     return found, troubles
 
 
-@lru_cache(maxsize=4096)
+@session.cached(("unregister",), 4096)
 def _read(path: Path, _changed: int, _size: int) -> tuple[native.Expression, ...] | str:
     """The expressions of one file, or what is wrong with it; read again when it has changed."""
     try:
@@ -130,7 +130,7 @@ def _read(path: Path, _changed: int, _size: int) -> tuple[native.Expression, ...
         return f"{text}."
 
 
-@lru_cache(maxsize=1024)
+@session.cached(("unregister",), 1024)
 def of_text(text: str) -> native.Expression | None:
     """The expression of a text that an asset bears, or None where it is none."""
     part = native.part("expressions")

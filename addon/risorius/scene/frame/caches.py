@@ -14,7 +14,7 @@ from typing import cast
 import bpy
 
 from ...logic.base.sentences import told
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 
 SIMULATED = frozenset(
@@ -22,7 +22,8 @@ SIMULATED = frozenset(
 )
 Key = tuple[int, str]  # of the object, and what of it has the cache
 
-_late: dict[int, set[Key]] = {}  # deforming armature -> caches that were always baked since load
+# Deforming armature -> caches that were always baked since load.
+_late: dict[int, set[Key]] = session.table("caches.late", ("load",))
 
 
 def of_scene(scene: bpy.types.Scene) -> Iterator[tuple[Key, bpy.types.PointCache]]:
@@ -113,11 +114,6 @@ def words(rig: ArmatureObject) -> str:
         "bake them again (caches: {count}).",
         count=count,
     )
-
-
-def forget() -> None:
-    """After load nothing is known of what is there."""
-    _late.clear()
 
 
 def are_late(scene: bpy.types.Scene) -> bool:

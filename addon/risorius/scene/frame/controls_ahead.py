@@ -22,11 +22,14 @@ from typing import cast
 import bpy
 
 from ...logic.base.sentences import told
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement
 from . import caches, lateness
 
+# Blender counts one reference too few to temporary data, and would free it twice. The newest that
+# was seen to do so; in a newer one the references are counted each time.
+MISCOUNTED_UNTIL = (5, 2)
 _FAR = 1_000_000  # frame of the first marker: no animation gets there
 _HANDLERS = (
     "frame_change_pre",
@@ -38,11 +41,14 @@ _TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
 
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 
-_stages: dict[int, _Stage] = {}  # scene -> its stage
-# edited: whether the file was since the last frame; simulated: whether anything in it is.
-_state = {"edited": True, "simulated": True}
-_evaluated_scenes: set[int] = set()  # session uids, since the last load or undo
-_lock = threading.Lock()  # a render works beside the interface
+# Scene -> its stage.
+_stages: dict[int, _Stage] = session.table("controls_ahead.stages", ("unregister",))
+# Whether the file was edited since the last frame, and whether anything in it is simulated.
+_edited = session.value("controls_ahead.edited", True, ("undo", "load"))
+_simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
+# Session uids of scenes, since the last load or undo.
+_evaluated_scenes: set[int] = session.keep("controls_ahead.evaluated_scenes", set, ("free",))
+_LOCK = threading.Lock()  # a render works beside the interface
 
 
 class _Stage:
@@ -56,9 +62,8 @@ class _Stage:
         data = bpy.data.temp_data()  # which the stubs take for what it gives
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
-        # Blender counts one reference to this too few, and would free it twice: ours and that of
-        # what gave it, with the one that is asked here, are three.
-        if sys.getrefcount(self._file) < 3:
+        # Ours, that of what gave it, and the one that is asked here are three.
+        if bpy.app.version[:2] <= MISCOUNTED_UNTIL or sys.getrefcount(self._file) < 3:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
         self._scene = self._file.scenes.new("Risorius")
         for number, item in enumerate(roots):
@@ -95,9 +100,9 @@ def is_needed() -> bool:
     done: what was edited may read a face.
     """
     # Without an interface scripts edit and step without an update between.
-    if _state["edited"] or bpy.app.background:
-        _state["simulated"] = caches.any_simulates()
-    if _state["edited"] or _state["simulated"]:
+    if _edited.now or bpy.app.background:
+        _simulated.now = caches.any_simulates()
+    if _edited.now or _simulated.now:
         return True
     ours = __name__.partition(".scene.")[0]
     places = (getattr(h, "__module__", None) or "" for h in bpy.app.handlers.frame_change_post)
@@ -133,13 +138,13 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
         The graph, and the faces whose controls can be read in it: not those that depend on what
         a face does, which is not known yet. Where another thread is at it, none.
     """
-    if not _lock.acquire(blocking=False):
+    if not _LOCK.acquire(blocking=False):
         return None, []
     try:
         known = [face for face in faces if not lateness.is_circle(*face)]
         graph = _evaluated(user, known) if known else None
-        if graph is None or not _faces_in(graph, known, whole=_state["edited"]):
-            _state["edited"] = False
+        if graph is None or not _faces_in(graph, known, whole=_edited.now):
+            _edited.now = False
             return graph, known
         # Either Blender built the graph anew since, and the whole faces came in with the
         # pointers; or something there depends on a face.
@@ -152,10 +157,10 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
                     lateness.note_circle(rig, controls)
             known = [face for face in known if not lateness.is_circle(*face)]
             graph = _evaluated(user, known) if known else None
-        _state["edited"] = False
+        _edited.now = False
         return graph, known
     finally:
-        _lock.release()
+        _LOCK.release()
 
 
 def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject) -> str:
@@ -169,7 +174,7 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
         Why it cannot be baked, in one sentence; empty where it can.
     """
     lateness.forget(rig)
-    with _lock:
+    with _LOCK:
         if not _depends(user, (rig, controls), [(rig, controls)]):
             return ""
     lateness.note_circle(rig, controls)
@@ -182,13 +187,13 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
 
 def note_edit() -> None:
     """Something was edited: Blender may build graphs anew."""
-    _state["edited"] = True
+    _edited.now = True
 
 
+@session.at("free")
 def close() -> None:
     """Give the scene and its graph back: before undo and load, which free what they point to."""
-    _evaluated_scenes.clear()
-    with _lock:
+    with _LOCK:
         _close()
 
 
@@ -205,9 +210,9 @@ def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
         stage = None
     if stage is None:
         stage = _stages[user.session_uid] = _Stage(roots)
-        _state["edited"] = True
+        _edited.now = True
     # Without an interface scripts edit and step without an update between, and nobody looks on.
-    with _alone(faces) if _state["edited"] or bpy.app.background else nullcontext():
+    with _alone(faces) if _edited.now or bpy.app.background else nullcontext():
         return stage.evaluate(user)
 
 

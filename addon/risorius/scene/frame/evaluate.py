@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import Enum, auto
 from time import perf_counter
 
 import bpy
@@ -17,7 +18,7 @@ import numpy as np
 
 from ... import native
 from ..animation import layers
-from ..base import drivers, parts, saved, written
+from ..base import drivers, parts, saved, session, written
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import lods, rig_placement, runtime
 from . import (
@@ -32,8 +33,25 @@ from . import (
     timing,
 )
 
-_pauses: list[bool] = []
-_ahead: dict[int, _Ahead] = {}  # deforming armature -> what was done before this frame
+_pauses = session.value("evaluate.pauses", 0, ("unregister",))
+# Deforming armature -> what was done before this frame.
+_ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
+
+
+class Moment(Enum):
+    """When a character is brought up.
+
+    UPDATE: after Blender evaluated what is read. ANEW: then, too, and what seems unchanged is
+    written as well. FRAME: before Blender evaluates a frame. RENDER: before one that is rendered.
+    """
+
+    UPDATE = auto()
+    ANEW = auto()
+    FRAME = auto()
+    RENDER = auto()
+
+
+_BEFORE_FRAME = frozenset((Moment.FRAME, Moment.RENDER))
 
 
 @dataclass(frozen=True)
@@ -54,28 +72,27 @@ class _Ahead:
 @contextmanager
 def paused() -> Iterator[None]:
     """While this lasts no frame and no update brings a face up: what is read is read by others."""
-    _pauses.append(True)
+    _pauses.now += 1
     try:
         yield
     finally:
-        _pauses.pop()
+        _pauses.now = max(0, _pauses.now - 1)  # the add-on may have gone meanwhile
 
 
 def is_paused() -> bool:
-    return bool(_pauses)
+    return _pauses.now > 0
 
 
-def evaluate_all(depsgraph: Depsgraph, force: bool = False) -> None:
+def evaluate_all(depsgraph: Depsgraph) -> None:
     """Bring every character of this file up to its controls.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
-        force: write also what seems unchanged.
     """
     if native.problem() or is_paused():
         return
     for rig in parts.rigs():
-        evaluate(rig, depsgraph, force)
+        evaluate(rig, depsgraph)
 
 
 def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
@@ -85,7 +102,6 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
         scene: at its new time.
         rendering: whether the frame is rendered.
     """
-    _ahead.clear()
     if native.problem() or is_paused() or not controls_ahead.is_needed():
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
@@ -100,7 +116,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     for rig, controls in faces:
         seen = controls.evaluated_get(depsgraph)
         glance = _glance(seen) if _is_simple(rig, seen) else None
-        wrote = evaluate(rig, depsgraph, ahead=True, rendering=rendering)
+        wrote = evaluate(rig, depsgraph, Moment.RENDER if rendering else Moment.FRAME)
         _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
 
 
@@ -155,30 +171,23 @@ def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bo
     return parts.FACE in seen.pose.bones and done.glance == _glance(seen)
 
 
-def evaluate(
-    rig: ArmatureObject,
-    depsgraph: Depsgraph,
-    force: bool = False,
-    ahead: bool = False,
-    rendering: bool = False,
-) -> bool:
+def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> bool:
     """Bring one character up to its controls.
 
     Args:
         rig: its deforming armature, the original.
-        depsgraph: the evaluated dependency graph to read from.
-        force: write also what seems unchanged.
-        ahead: `depsgraph` has the controls alone, at a frame that Blender is about to evaluate.
-        rendering: whether that frame is rendered.
+        depsgraph: the evaluated dependency graph to read from; before a frame it has the controls
+            alone.
+        moment: Moment.
 
     Returns:
         Whether there was anything to write.
     """
+    times = [perf_counter()]
     controls = None if parts.BAKED in rig else parts.controls_of(rig)  # baked: its actions move it
     live = runtime.of(rig) if controls is not None else None
     if controls is None or live is None:
         return False
-    times = [perf_counter()]
     seen = controls.evaluated_get(depsgraph)
     if not seen.is_evaluated and not rig.evaluated_get(depsgraph).is_evaluated:
         return False  # it is not in this scene
@@ -186,16 +195,13 @@ def evaluate(
         return False  # renamed a moment ago, and not evaluated since
     raw, turns = inputs.read_inputs(seen, live, depsgraph, parts.maximum_of(controls))
     rig_placement.follow(rig, seen)
-    if ahead:
-        last = written.inputs.get(rig.session_uid)
-        lod = lods.expected(rig, rendering, last[1] if isinstance(last, tuple) else None)
-    else:
-        lod = lods.choose(rig, seen, depsgraph)
-    lod = min(max(lod, 0), max(live.rig.lod_count - 1, 0))
+    lod = min(max(_lod(rig, seen, depsgraph, moment), 0), max(live.rig.lod_count - 1, 0))
     test = channel_preview.override(rig, raw, depsgraph.scene)
-    look = look_masks.for_frame(rig, rendering or depsgraph.mode == "RENDER")
+    rendering = moment is Moment.RENDER or depsgraph.mode == "RENDER"
+    look = look_masks.for_frame(rig, rendering)
     state = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
-    if not written.is_new(written.inputs, rig, state) and not force:
+    anew = moment is Moment.ANEW
+    if not written.is_new(written.inputs, rig, state) and not anew:
         timing.looked(times[0])
         return False
     times.append(perf_counter())
@@ -211,11 +217,20 @@ def evaluate(
     times.append(perf_counter())
     for item in parts.meshes_of(rig):
         if lods.shows(item, lod):
-            live_keys.write(item, live, pose.blend_shapes, force, ahead)
+            live_keys.write(item, live, pose.blend_shapes, anew, moment in _BEFORE_FRAME)
     rig.update_tag(refresh={"OBJECT"})
     times.append(perf_counter())
     timing.add(times)
     return True
+
+
+def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment: Moment) -> int:
+    """The level of detail to show. Args: see evaluate; seen  its controls, evaluated."""
+    if moment not in _BEFORE_FRAME:
+        return lods.choose(rig, seen, depsgraph)
+    last = written.inputs.get(rig.session_uid)
+    known = last[1] if isinstance(last, tuple) else None
+    return lods.expected(rig, moment is Moment.RENDER, known)
 
 
 def bring_up(context: Context, rig: ArmatureObject) -> None:
@@ -226,7 +241,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
         rig: deforming armature of the character.
     """
     context.view_layer.update()
-    evaluate(rig, context.evaluated_depsgraph_get(), force=True)
+    evaluate(rig, context.evaluated_depsgraph_get(), Moment.ANEW)
     context.view_layer.update()
     # Nothing is left to be evaluated after an operator, so 5.2 would draw no view again.
     for window in context.window_manager.windows:

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...logic.base.sentences import told
-from ..base import compat, parts
+from ..base import compat, parts, session
 from ..base.blender_types import ArmatureObject
 
 
@@ -27,8 +27,10 @@ class _Late:
     frames: int = 0
 
 
-_circles: dict[int, _Late] = {}  # deforming armature -> why its controls wait for a face
-_others: dict[int, _Late] = {}  # -> what had another value after the frame than before it
+# Deforming armature -> why its controls wait for a face.
+_circles: dict[int, _Late] = session.table("lateness.circles", ("undo", "load"))
+# Deforming armature -> what had another value after the frame than before it.
+_others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:

@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, saved, written
+from ..base import parts, saved, session, written
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
 KINDS = ("JOINTS", "SHAPES", "MAPS")
-_held: dict[int, str] = {}  # deforming armature -> what was taken from it while a file is saved
+# Deforming armature -> what was taken from it while a file is saved.
+_held: dict[int, str] = session.table("look_masks.held", ("unregister",))
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from statistics import median
 from time import perf_counter
 
 from ...logic.base.sentences import Sentence, told
+from ..base import session
 
 STAGES = ("controls", "rig", "bones", "shapes")
 _KEPT = 30  # frames that the overlay shows the median of
@@ -30,8 +31,8 @@ class Frame:
         return sum(self.stages.values())
 
 
-frames = deque([Frame()], maxlen=_KEPT)
-_drawing = [0.0]
+frames = session.keep("timing.frames", lambda: deque([Frame()], maxlen=_KEPT), ("unregister",))
+_drawing = session.value("timing.drawing", 0.0, ("unregister",))
 
 
 def begin() -> None:
@@ -67,14 +68,14 @@ def add(times: Sequence[float]) -> None:
 
 def drawing_begins() -> None:
     """Blender has evaluated what was written, and begins to draw a view."""
-    _drawing[0] = perf_counter()
+    _drawing.now = perf_counter()
     if not frames[-1].deform:
         frames[-1].deform = _since(frames[-1].ended)
 
 
 def drawing_ends() -> None:
     """Blender has told the graphics card what to draw."""
-    frames[-1].drawing = _since(_drawing[0])
+    frames[-1].drawing = _since(_drawing.now)
 
 
 def _since(moment: float) -> float:

@@ -19,7 +19,7 @@ from mathutils import Euler, Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...logic.base.sentences import Sentence, told
-from ..base import parts, written
+from ..base import parts, session, written
 from ..base.blender_types import ArmatureObject, MeshObject
 
 _NEAR = 1e-5  # of the largest number: what multiplying in float32 leaves
@@ -57,14 +57,9 @@ class _Moved:
 
 
 # Session uid of a part, or of what hangs on one -> what was seen of it.
-_noted: dict[int, _Seen] = {}
-_said: dict[int, Sentence] = {}  # session uid of a deforming armature -> what was taken back last
-
-
-def forget() -> None:
-    """After load and undo: what was seen before says nothing about what is there."""
-    _noted.clear()
-    _said.clear()
+_noted: dict[int, _Seen] = session.table("applied_transforms.noted", ("undo", "load"))
+# Session uid of a deforming armature -> what was taken back last.
+_said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "load"))
 
 
 def last_said(rig: ArmatureObject) -> Sentence | None:

@@ -12,15 +12,12 @@ from collections.abc import Sequence
 import bpy
 import numpy as np
 
-from ..base import parts
+from ..base import parts, session
 
 # Session uid of an armature -> its bones' names, marks and places at rest, as last seen.
-_seen: dict[int, tuple[Sequence[object], bytes]] = {}
-
-
-def forget() -> None:
-    """After load: what was seen before says nothing about what is there."""
-    _seen.clear()
+_seen: dict[int, tuple[Sequence[object], bytes]] = session.table(
+    "bone_edits.seen", ("undo", "load")
+)
 
 
 def is_edited(armature: bpy.types.Armature) -> bool:

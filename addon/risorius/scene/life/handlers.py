@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 from typing import Any, cast
 
 import bpy
@@ -12,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layer_mixing, layers, tweak_guard
-from ..base import console, parts, sharing, written
+from ..base import console, parts, session, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import board, lods, outlines, rig_placement, runtime, shown_keys
 from ..frame import (
@@ -24,27 +25,37 @@ from ..frame import (
     look_masks,
     timing,
 )
-from ..why import causes, displacement, heat
-from ..why import present as why_present
+from ..why import heat
 from . import applied_transforms, bone_edits, duplicates, migrations, repair
 
-# objects: session uids of those seen; faces: of control armatures that are not new;
-# mended: of characters that were mended at the last update.
-# rendering: since a render began.
-_state: dict[str, Any] = {
-    "objects": frozenset(),
-    "faces": frozenset(),
-    "busy": False,
-    "mended": set(),
-    "rendering": False,
-}
+
+@dataclass
+class _Work:
+    """What the handlers are at.
+
+    Attributes:
+        busy: whether an update is followed now.
+        rendering: since a render began.
+    """
+
+    busy: bool = False
+    rendering: bool = False
+
+
+_work = session.keep("handlers.work", _Work, ("unregister",))
+# Session uids: of the objects that were seen; of control armatures that are not new; of characters
+# that were mended at the last update.
+_objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
+_faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
+_mended: set[int] = session.keep("handlers.mended", set, ("load",))
 
 
 @persistent
 def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
+    session.end("frame")
     timing.begin()
     caches.look()
-    if not _state["rendering"] and not native.problem():
+    if not _work.rendering and not native.problem():
         for controls in filter(None, map(parts.controls_of, parts.rigs())):
             tweak_guard.settle(controls)
     evaluate.before_frame(scene, _is_rendered())
@@ -60,20 +71,20 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 def _is_rendered() -> bool:
     """Whether the frame that changes is a render's: beside one the interface has its own."""
-    if not _state["rendering"] or not bpy.app.is_job_running("RENDER"):
-        return bool(_state["rendering"])
+    if not _work.rendering or not bpy.app.is_job_running("RENDER"):
+        return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
 
 
 @persistent
 def _render_begins(*_arguments: object) -> None:
-    _state["rendering"] = True
+    _work.rendering = True
 
 
 @persistent
 def _render_ended(*_arguments: object) -> None:
     """The viewport shows its own level of detail again."""
-    _state["rendering"] = False
+    _work.rendering = False
     for rig in parts.rigs():
         controls = parts.controls_of(rig)
         apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
@@ -90,16 +101,17 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     controls_ahead.note_edit()
     board.note_edit()
     # While a render runs beside the interface, only its own frames are written.
-    if _state["busy"] or bpy.app.is_job_running("RENDER") or native.problem():
+    if _work.busy or bpy.app.is_job_running("RENDER") or native.problem():
         return
     if evaluate.is_paused():
         return
-    _state["busy"] = True
+    _work.busy = True
     try:
         _notice_copies(depsgraph.updates)
         # A change of a colour space is among the updates, one of pixels is not.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
-        waiting, _state["mended"] = _state["mended"], set()
+        waiting = set(_mended)
+        _mended.clear()
         edited = _edited(depsgraph)
         edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]
         if edited:
@@ -109,7 +121,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
                 continue  # the evaluated copy knows of it only after the next update
             evaluate.evaluate(rig, depsgraph)
     finally:
-        _state["busy"] = False
+        _work.busy = False
 
 
 def _mend(rig: ArmatureObject) -> bool:
@@ -117,22 +129,22 @@ def _mend(rig: ArmatureObject) -> bool:
     console.say(*done)
     if done:
         _note_mended(rig)
-    return rig.session_uid in _state["mended"]
+    return rig.session_uid in _mended
 
 
 def _note_mended(rig: ArmatureObject) -> None:
-    _state["mended"].add(rig.session_uid)
+    _mended.add(rig.session_uid)
     rig[parts.CONTROLS].update_tag()
 
 
 def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
     # Their number alone does not tell: as many may go as come in one step.
-    known = _state["objects"]
+    known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
     come = bool(known)  # else all was there: a file was loaded, or an edit undone
     if new or len(bpy.data.objects) != len(known):
-        _state["objects"] = {item.session_uid for item in bpy.data.objects}
+        _objects.now = frozenset(item.session_uid for item in bpy.data.objects)
         runtime.forget_unused(parts.rigs())
         _tidy_new()
         layer_mixing.forget_unused(map(parts.controls_of, parts.rigs()))
@@ -155,9 +167,9 @@ def _imported(*_arguments: object) -> None:
 def _tidy_new() -> None:
     """Outlines of appended faces leave the scene; objects that the user links later stay."""
     there = {c.session_uid: c for c in map(parts.controls_of, parts.rigs()) if c is not None}
-    for uid in there.keys() - _state["faces"]:
+    for uid in there.keys() - _faces.now:
         outlines.tidy(there[uid])
-    _state["faces"] = frozenset(there)
+    _faces.now = frozenset(there)
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
@@ -225,7 +237,7 @@ def _loaded(*_arguments: object) -> None:
     """After load: Blender calls no update handler when it evaluates a file for the first time."""
     context = current_context()
     layer = context.view_layer
-    migrations.forget()
+    session.end("load")
     if not native.problem():
         console.say(*migrations.bring_up_all())
     if layer is not None and not native.problem() and parts.rigs():
@@ -249,21 +261,12 @@ def _restored(*_arguments: object) -> None:
     Nothing is read here: until the next update the pose bones of objects that undo brought back
     point to bones that are no more, and Blender dies of a look at them.
     """
-    written.forget()
-    lateness.forget()
-    layer_mixing.forget()
-    shown_keys.forget()
-    tweak_guard.forget()
-    applied_transforms.forget()
-    bone_edits.forget()
-    causes.forget()
+    session.end("undo")
     heat.follow_undo()
-    board.forget()
-    _state["objects"] = frozenset()
     if native.problem():
         return
     there = [c for c in map(parts.controls_of, parts.rigs()) if c is not None]
-    _state["faces"] = frozenset(controls.session_uid for controls in there)
+    _faces.now = frozenset(controls.session_uid for controls in there)
     for controls in there:
         controls.update_tag()
 
@@ -271,7 +274,7 @@ def _restored(*_arguments: object) -> None:
 @persistent
 def _before_restoring(*_arguments: object) -> None:
     """Before load, undo and redo: what is freed by them is let go."""
-    controls_ahead.close()
+    session.end("free")
 
 
 @persistent
@@ -344,7 +347,6 @@ def _there() -> list[tuple[str, Any]]:
 
 def register() -> None:
     """Add the handlers, and bring up what is already there."""
-    _state.update(objects=frozenset(), faces=frozenset(), busy=False, mended=set(), rendering=False)
     for name, handler in _there():
         present = getattr(bpy.app.handlers, name)
         if handler not in present:
@@ -360,11 +362,3 @@ def unregister() -> None:
         present = getattr(bpy.app.handlers, name)
         if handler in present:
             present.remove(handler)
-    controls_ahead.close()
-    lateness.forget()
-    layer_mixing.forget()
-    sharing.forget()
-    causes.forget()
-    displacement.forget()
-    why_present.forget()
-    runtime.forget()

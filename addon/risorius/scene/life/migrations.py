@@ -8,11 +8,12 @@ Nothing is brought down: a character of a newer form plays as far as this versio
 from __future__ import annotations
 
 from ..animation import actions
-from ..base import form, parts
+from ..base import form, parts, session
 from ..base.blender_types import ArmatureObject
 from ..frame import caches, joint_turns
 
-_said: set[int] = set()  # session uids of characters that something was said of
+# Session uids of characters that something was said of.
+_said: set[int] = session.keep("migrations.said", set, ("load",))
 
 
 def bring_up_all() -> list[str]:
@@ -72,11 +73,6 @@ def newer(rig: ArmatureObject) -> str:
         f"{rig.name} was saved by a newer Risorius (form {found}, this one knows {form.PRESENT}): "
         "it plays and is left as it is; install the newer add-on to edit it."
     )
-
-
-def forget() -> None:
-    """After load session uids may mean others."""
-    _said.clear()
 
 
 def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:

@@ -17,6 +17,7 @@ from bpy.app.handlers import persistent
 from ... import native
 from ..animation import clip_actions, range_properties
 from ..base import parts
+from ..base import session as registry
 from ..base.blender_types import ArmatureObject, current_context
 from ..character import runtime
 from . import recordings, sessions
@@ -37,7 +38,7 @@ class _State:
     undone: bool = False  # since the last beat
 
 
-_state = _State()
+_state = registry.keep("capture.state", _State, ("unregister",))
 
 
 def last_error() -> str:
@@ -225,7 +226,6 @@ _HANDLERS = (
 
 def register() -> None:
     """Add the handlers."""
-    _state.error, _state.since_redraw, _state.undone = "", 0.0, False
     for name, handler in _HANDLERS:
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

@@ -16,10 +16,12 @@ from ...logic.animation.clip_units import ClipError
 from ...logic.base import names
 from ..animation import actions, board_keys, clip_actions, layers
 from ..base import parts
+from ..base import session as registry
 from ..base.blender_types import ArmatureObject
 from ..character import standing
 
-_waiting: list[Recording] = []  # ended without becoming an action, the oldest first
+# Ended without becoming an action, the oldest first.
+_waiting: list[Recording] = registry.keep("recordings.waiting", list, ("quit",))
 
 
 @dataclass

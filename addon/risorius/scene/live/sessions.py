@@ -14,12 +14,16 @@ import bpy
 
 from ... import native
 from ..base import parts
+from ..base import session as registry
 from ..base.blender_types import ArmatureObject
 from .recordings import Recording
 
-_sessions: dict[int, Session] = {}  # session uid of a control armature -> Session
+# Session uid of a control armature -> Session.
+_sessions: dict[int, Session] = registry.table("sessions.sessions", ("unregister",))
 # (source, port, host) -> the Receiver of all sessions that listen there
-_receivers: dict[tuple[str, int, str], native.Receiver] = {}
+_receivers: dict[tuple[str, int, str], native.Receiver] = registry.table(
+    "sessions.receivers", ("unregister",)
+)
 
 
 @dataclass

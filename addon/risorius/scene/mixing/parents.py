@@ -15,11 +15,16 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...logic.character import plans
+from ..base import session
 from ..base.blender_types import Context, MeshObject
 
 PREVIEW = "risorius_mix_preview"  # on the object that shows the mix
-_read: dict[str, tuple[tuple[float, int], native.Dna]] = {}  # path -> when and how large, its Dna
-_seen: dict[tuple[str, ...], _Seen] = {}  # the paths of now -> what the preview needs
+# Path -> when and how large, its Dna.
+_read: dict[str, tuple[tuple[float, int], native.Dna]] = session.table(
+    "parents.read", ("unregister",)
+)
+# The paths of now -> what the preview needs.
+_seen: dict[tuple[str, ...], _Seen] = session.table("parents.seen", ("unregister",))
 
 Regions = Mapping[str, Mapping[int, float]]
 

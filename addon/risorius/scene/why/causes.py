@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 from . import displacement, present
 
 Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joints and shapes, of one or of many
 _LEAST = 1e-3  # millimetres that are no movement: float32 of a head that stands 1.7 m high
 _MOST_FIRING = 24  # correctives whose reach is computed, those of the largest values
-_found: dict[int, Found] = {}  # deforming armature -> what was last found of it
-_fired: dict[int, tuple[object, list[Cause]]] = {}
+# Deforming armature -> what was last found of it.
+_found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
+# Deforming armature -> the correctives that fire, and what they were computed from.
+_fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
 
 
 @dataclass(frozen=True)
@@ -316,9 +318,3 @@ def mesh_of(item: object) -> int:
     """The index in the file of a mesh object of a character, -1 for any other object."""
     get = getattr(item, "get", None)
     return int(get(parts.MESH, -1)) if get is not None else -1
-
-
-def forget() -> None:
-    """Let go of all that was found: after load and undo, session uids may mean others."""
-    _found.clear()
-    _fired.clear()

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...logic.base.space import world_matrices
-from ..base import parts
+from ..base import parts, session
 from ..base.blender_types import ArmatureObject
 from ..character import lods, meshes, runtime
 
 Doubles = NDArray[np.float64]
-_skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = {}
+_skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = session.table(
+    "displacement.skins", ("load",)
+)
 _MOST = 24  # meshes whose weights are kept
 
 
@@ -64,11 +66,6 @@ def _skin(live: runtime.Runtime, mesh: int) -> Skin:
         weights=np.asarray(held.skin_weights, np.float64),
         bound=np.diff(offsets) > 0,
     )
-
-
-def forget() -> None:
-    """Let go of all skins."""
-    _skins.clear()
 
 
 def moves(live: runtime.Runtime, joints: NDArray[np.float32]) -> Doubles:

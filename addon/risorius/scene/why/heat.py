@@ -22,7 +22,7 @@ from ...logic.base import heat_ramp
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..animation import layers
-from ..base import parts, saved
+from ..base import parts, saved, session
 from ..base.blender_types import (
     ArmatureObject,
     Attribute,
@@ -35,8 +35,10 @@ from . import causes, displacement, heat_views, layer_share, present
 
 KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # millimetres at the hot end at least: noise shall not glow
-_shown: dict[int, object] = {}  # deforming armature -> what its colours were computed from
-_held: dict[int, tuple[str, str]] = {}  # deforming armature -> its map while a file is saved
+# Deforming armature -> what its colours were computed from.
+_shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
+# Deforming armature -> its map while a file is saved.
+_held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
 _PAUSE = 0.15  # seconds between two looks at whether the pose is another one
 
 
@@ -231,7 +233,6 @@ def end_all() -> None:
 
 def follow_undo() -> None:
     """After undo and redo: views show colours where there are some, and else do not."""
-    _shown.clear()
     if any(parts.HEAT in rig for rig in parts.rigs()):
         heat_views.show()
         watch()
@@ -300,8 +301,3 @@ def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -
     places = layers.places(controls) if controls is not None else ()
     name = places[int(heat.what)].name if int(heat.what) < len(places) else heat.what
     return told("Added by layer {name}", name=name)
-
-
-def forget() -> None:
-    """Session uids may mean others."""
-    _shown.clear()

@@ -8,9 +8,11 @@ from typing import Any, cast
 
 import bpy
 
+from ..base import session
+
 _SETTINGS = ("type", "color_type", "light")
 # Pointer of a view -> its settings of before. A view has no name and outlives undo.
-_before: dict[int, dict[str, str]] = {}
+_before: dict[int, dict[str, str]] = session.table("heat_views.before", ("unregister",))
 
 
 def _views() -> Iterator[bpy.types.SpaceView3D]:

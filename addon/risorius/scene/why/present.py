@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, written
+from ..base import parts, session, written
 from ..base.blender_types import ArmatureObject
 from ..character import lods, runtime
 from ..frame import inputs, look_masks
 
 Factors = dict[int, list[int]]
 # id of a Runtime -> itself, its ControlNames, the factors of its correctives
-_known: dict[int, tuple[runtime.Runtime, native.ControlNames, Factors]] = {}
+_known: dict[int, tuple[runtime.Runtime, native.ControlNames, Factors]] = session.table(
+    "present.known", ("load",)
+)
 
 
 @dataclass(frozen=True)
@@ -123,8 +125,3 @@ def name_of(live: runtime.Runtime, control: int) -> str:
         return shape
     factors = [str(names.short(c)) for c in factors_of(live).get(control, ())]
     return " x ".join(factors) or str(names.name(control))
-
-
-def forget() -> None:
-    """Let go of all names."""
-    _known.clear()

@@ -6,12 +6,13 @@ from typing import cast
 import blf
 import bpy
 
+from ...scene.base import session
 from ...scene.base.blender_types import WindowManager
 from ...scene.frame import timing
 from .. import words
 from ..blender_types import Context
 
-_handles: list[object] = []
+_handles: list[object] = session.keep("timing_overlay.handles", list, ("unregister",))
 
 
 def show_property() -> object:

@@ -3,7 +3,6 @@
 # pyright: reportInvalidTypeForm=false
 """Operators that bring animation in from files and from other rigs."""
 
-from functools import cache
 from pathlib import Path
 
 import bpy
@@ -13,7 +12,7 @@ from ...logic.base.errors import FaceError
 from ...logic.base.names import printable
 from ...logic.base.sentences import told
 from ...scene.animation import range_properties, retarget_shape_keys
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.character import runtime
 from .. import words
 from ..blender_types import Context, FileHandler, ImportHelper, Item, Menu, Operator, Result
@@ -71,13 +70,13 @@ CLIP_EXTENSION = ".rzc"
 SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mov", ".mkv")
 
 
-@cache
+@session.cached(("unregister",))
 def _kinds() -> list[Item]:
     kinds = native.part("importing").KINDS.items()
     return [("AUTO", "Automatic", "Told from the file"), *((k, t, "") for k, t in kinds)]
 
 
-@cache
+@session.cached(("unregister",))
 def _mappings() -> list[Item]:
     names = native.part("importing").mapping_names()
     return [

@@ -16,6 +16,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from ...scene.base import session
 from ..blender_types import Context
 
 Float = NDArray[np.float64]
@@ -53,9 +54,9 @@ class Shown:
     triangles: NDArray[np.int32] | None = None
 
 
-_now = [Shown()]
-_handles: list[object] = []
-_users: set[str] = set()
+_shown = session.value("drawing.shown", Shown(), ("unregister",))
+_handles: list[object] = session.keep("drawing.handles", list, ("unregister",))
+_users: set[str] = session.keep("drawing.users", set, ("unregister",))
 
 
 def start(user: str) -> None:
@@ -69,7 +70,7 @@ def start(user: str) -> None:
 
 def show(context: Context, shown: Shown) -> None:
     """Draw this. Args: context  whose views are drawn anew; shown  what."""
-    _now[0] = shown
+    _shown.now = shown
     tag(context)
 
 
@@ -118,7 +119,7 @@ def _view() -> bpy.types.RegionView3D | None:
 
 
 def _draw_heat() -> None:
-    shown, view = _now[0], _view()
+    shown, view = _shown.now, _view()
     if shown.places is None or shown.far is None or shown.triangles is None or view is None:
         return
     most = float(shown.far.max(initial=0.0))
@@ -162,7 +163,7 @@ def draw_points(context: Context, marks: list[Mark]) -> Vector | None:
 
 
 def _draw_marks() -> None:
-    context, shown = cast(Context, bpy.context), _now[0]
+    context, shown = cast(Context, bpy.context), _shown.now
     first = draw_points(context, shown.points)
     if first is None:
         return

@@ -11,7 +11,7 @@ import bpy
 from bpy.types import WorkSpaceTool
 
 from ...logic.base.errors import FaceError
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.character import runtime
 from ...scene.drag import picking
 from ..blender_types import Context, Operator, Result, UILayout
@@ -42,9 +42,11 @@ _KEYS = (
     ("risorius.drag_hover", {"type": "MOUSEMOVE", "value": "ANY"}, None),
 )
 
-_before: dict[str, str] = {}  # workspace and mode -> the tool that this one took the place of
-_pointed: list[tuple[int, tuple[int, int]]] = []  # session uid of a face, its point at the pointer
-_handles: list[object] = []
+# Workspace and mode -> the tool that this one took the place of.
+_before: dict[str, str] = session.table("tool.before", ("unregister",))
+# Session uid of a face, its point at the pointer.
+_pointed: list[tuple[int, tuple[int, int]]] = session.keep("tool.pointed", list, ("load",))
+_handles: list[object] = session.keep("tool.handles", list, ("unregister",))
 
 
 class _Tool(WorkSpaceTool):

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import bpy
 
+from ...scene.base import session
 from ...scene.base.blender_types import current_context
 from ...scene.character import runtime
 from ...scene.expressions import library, thumbnails
@@ -16,7 +17,8 @@ from .menus import RISORIUS_MT_expressions
 from .properties import ALL, STARRED, RISORIUS_PG_expressions, choices, remember_categories
 
 _ICON = 20.0  # pixels of an icon, and of the picture for each unit of its size
-_asked: set[str] = set()  # looks of characters whose pictures were begun by themselves
+# Looks of characters whose pictures were begun by themselves.
+_asked: set[str] = session.keep("expressions.panel.asked", set, ("unregister",))
 
 
 class RISORIUS_PT_expressions(FaceOnlyPanel, Panel):

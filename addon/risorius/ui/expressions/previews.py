@@ -7,12 +7,14 @@ from typing import Any
 import bpy
 import bpy.utils.previews
 
+from ...scene.base import session
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import runtime
 from ...scene.expressions import poses, thumbnails
 from ...scene.expressions.library import Item
 
-_held: dict[str, Any] = {}  # "icons": Blender's collection of them
+# "icons": Blender's collection of them.
+_held: dict[str, Any] = session.table("previews.held", ("unregister",))
 
 
 def icon_of(path: Path) -> int:

@@ -8,11 +8,13 @@ from typing import cast
 import bpy
 
 from ... import native
+from ...scene.base import session
 from ..blender_types import Context, Item
 from ..words import say
 
 ALL, STARRED = "ALL", "STARRED"
-_known: dict[str, list[Item]] = {}  # Blender keeps no names of items that a function gives
+# Blender keeps no names of items that a function gives.
+_known: dict[str, list[Item]] = session.table("expressions.properties.known", ("unregister",))
 
 
 def region_items(_self: object, _context: object) -> list[tuple[str, str, str, int]]:

@@ -7,7 +7,7 @@ from typing import cast
 
 import bpy
 
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
@@ -15,7 +15,8 @@ from ..blender_types import Context, Item, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_rig
 from ..words import NAMES, say
 
-_items: list[Item] = []  # Blender reads the strings later: they must stay alive
+# Blender reads the strings later: they must stay alive.
+_items: list[Item] = session.keep("channel_preview.items", list, ("unregister",))
 
 
 def _test(context: Context, rig: ArmatureObject, channel: int, value: float | None) -> None:

@@ -2,7 +2,6 @@
 """The panel Controls: one slider per control, grouped by region."""
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import bpy
@@ -11,7 +10,7 @@ from ... import native
 from ...language import tables
 from ...logic.base.control_words import PREFIX
 from ...logic.character import first_sliders, slider_rows, slider_words
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.character import board, runtime, sides
 from .. import words
 from ..blender_types import Context, Icon, Panel, UILayout
@@ -72,13 +71,13 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
 
 
 # A panel is drawn again with every frame that plays: what is in it is sorted once.
-@lru_cache(maxsize=8)
+@session.cached(("unregister",), 8)
 def _regions(shown: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     groups = slider_words.group_controls(shown, native.regions())
     return [(region, tuple(shown[i] for i in places)) for region, places in groups.items()]
 
 
-@lru_cache(maxsize=64)
+@session.cached(("unregister",), 64)
 def _rows(names: tuple[str, ...], region: str, seen: bool) -> first_sliders.Parted:
     rows = slider_rows.rows_of(names, region, native.regions(), seen)
     return first_sliders.part(rows, region)

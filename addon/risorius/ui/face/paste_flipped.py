@@ -16,7 +16,7 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ...logic.character import slider_rows
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.character import board, sides
 from ..blender_types import Context, Menu, Operator
@@ -26,8 +26,9 @@ from ..words import say
 
 _MARK = 0.3215  # no hand sets a slider to it
 _BLENDERS = "POSE_OT_paste"
-_keys: list[Any] = []
-_seen: dict[str, object] = {}  # last: which operator was; selected: how it had pasted
+_keys: list[Any] = session.keep("paste_flipped.keys", list, ("unregister",))
+# Last: which operator was; selected: how it had pasted.
+_seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 
 def _posed_controls(context: Context) -> ArmatureObject | None:

@@ -9,6 +9,7 @@ import bpy
 
 from ... import native
 from ...logic.character import slider_rows
+from ...scene.base import session
 from ...scene.character import sides
 from ...scene.frame import evaluate, inputs
 from ..blender_types import Context, Operator, Result
@@ -16,7 +17,8 @@ from ..common import FaceOperator, face_controls, face_rig
 from ..hand.base import HandOperator
 from ..words import say
 
-_copied: dict[str, float] = {}  # the sliders that were copied last, of any face
+# The sliders that were copied last, of any face.
+_copied: dict[str, float] = session.table("side_operators.copied", ("unregister",))
 
 
 def _only_region() -> object:

@@ -5,7 +5,7 @@
 
 import bpy
 
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.base.blender_types import current_context
 from ...scene.character import outlines
 from ..blender_types import Context, Operator, Result
@@ -13,7 +13,9 @@ from ..common import FaceOperator, face_controls, face_rig
 from ..words import say
 from . import framing
 
-_keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = []
+_keys: list[tuple[bpy.types.KeyMap, bpy.types.KeyMapItem]] = session.keep(
+    "framing_operators.keys", list, ("unregister",)
+)
 
 
 class RISORIUS_OT_frame_face(FaceOperator, Operator):

@@ -12,7 +12,7 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ...logic.base import heat_ramp
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import look_masks
 from ...scene.why import causes, heat, present
@@ -22,7 +22,7 @@ from .properties import choices
 from .spoken import spoken, title
 
 Colour = tuple[float, float, float, float]
-_handles: list[object] = []
+_handles: list[object] = session.keep("overlay.handles", list, ("unregister",))
 _WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
 _DIM: Colour = (0.72, 0.72, 0.72, 1.0)
 _BOX: Colour = (0.09, 0.09, 0.10, 0.86)

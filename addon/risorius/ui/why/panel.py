@@ -4,7 +4,7 @@
 import bpy
 
 from ...scene.animation import layers
-from ...scene.base import parts
+from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.frame import look_masks
 from ...scene.why import causes, heat, present
@@ -15,7 +15,8 @@ from .properties import choices
 from .spoken import spoken, title
 
 _ROWS = 10  # of a list
-_soon: list[bool] = []  # whether the strongest correctives are asked for, a moment after a change
+# Whether the strongest correctives are asked for, a moment after a change.
+_soon = session.value("why.panel.soon", False, ("load",))
 
 
 class RISORIUS_PT_why(FaceOnlyPanel, Panel):
@@ -151,13 +152,13 @@ def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> 
 
 def _ask_soon() -> None:
     """Compute the list when the hand rests for a moment: a drag shall not wait for it."""
-    if not _soon:
-        _soon.append(True)
+    if not _soon.now:
+        _soon.now = True
         bpy.app.timers.register(_ask, first_interval=0.2)
 
 
 def _ask() -> None:
-    _soon.clear()
+    _soon.now = False
     for rig in parts.rigs():
         causes.strongest(rig)
     for window in current_context().window_manager.windows:
@@ -170,7 +171,7 @@ def stop() -> None:
     """Ask for nothing any more."""
     if bpy.app.timers.is_registered(_ask):
         bpy.app.timers.unregister(_ask)
-    _soon.clear()
+    _soon.now = False
 
 
 CLASSES = (RISORIUS_PT_why,)

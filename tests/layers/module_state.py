@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: MIT
+"""Finds what a module or a class of the add-on remembers outside scene/base/session.py.
+
+A name of a module may stand for
+
+- what session gave: `_found = session.table(...)`;
+- what cannot change: a number, a text, a tuple of these, a frozenset, a pattern, a type;
+- in UPPER_CASE, any table, list or set: nothing of the add-on changes one of that name.
+
+The names of a class are held to the same; those that begin with bl_ are read by Blender, which
+wants sets. Nothing is rebound by `global`, by `Class.name = ...` or by `module.name = ...`. A
+function is cached by `session.cached`; logic, language and native.py know no session: their cached
+functions are handed to `session.adopt` in registration.py.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import PurePosixPath
+from typing import Any, NamedTuple
+
+SESSION = "scene/base/session.py"
+REGISTRATION = "registration.py"
+WITHOUT_SESSION = ("logic/", "language/", "native.py")  # rooms that may not import scene
+CONSTANT = re.compile(r"_?[A-Z][A-Z0-9_]+")
+CACHES = {"cache", "lru_cache"}
+# Changed by being read, or made to be changed, whatever the name.
+ALWAYS_MUTABLE = {
+    "deque", "defaultdict", "OrderedDict", "Counter", "ChainMap", "WeakKeyDictionary",
+    "WeakValueDictionary", "WeakSet", "bytearray", "Queue", "SimpleQueue", "local", "iter", "count",
+    "cycle",
+}  # fmt: skip
+FIXED = {
+    "frozenset", "tuple", "MappingProxyType", "compile", "float", "int", "str", "len", "TypeVar",
+    "NewType", "told", "partial", "field", "UUID", "Struct", "TypedDict", "namedtuple",
+}  # fmt: skip
+# Classes whose objects a constant may be. Lock: it remembers nothing after its `with`.
+VALUES = {"Lock", "Matrix", "Vector", "Quaternion", "Path"}
+CHANGES = {
+    "add", "append", "appendleft", "clear", "discard", "extend", "fill", "insert", "pop",
+    "popitem", "popleft", "remove", "reverse", "setdefault", "sort", "update",
+}  # fmt: skip
+
+
+def _last(node: ast.expr) -> str:
+    """The last word of a name with dots."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _first(node: ast.expr) -> str:
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _is_fixed(value: ast.expr, session: str) -> bool:
+    """Whether a value cannot change, or is another name of something that has its own rule.
+
+    Args:
+        value: what is assigned.
+        session: the name that the file has for the registry.
+    """
+    parts = {"Tuple": "elts", "IfExp": "body orelse", "Starred": "value"}
+    if type(value).__name__ in parts:
+        found = [getattr(value, name) for name in parts[type(value).__name__].split()]
+        inner = found[0] if isinstance(found[0], list) else found
+        return all(_is_fixed(part, session) for part in inner)
+    if isinstance(value, ast.Call):
+        return _last(value.func) in FIXED or _first(value.func) == session
+    kinds = (
+        ast.Constant, ast.JoinedStr, ast.Name, ast.Attribute, ast.Subscript, ast.BinOp,
+        ast.UnaryOp, ast.BoolOp, ast.Compare, ast.Lambda,
+    )  # fmt: skip
+    return isinstance(value, kinds)
+
+
+def _is_constant(value: ast.expr, frozen: set[str]) -> bool:
+    """Whether a name in UPPER_CASE may stand for a value. Args: frozen  see _frozen."""
+    if not isinstance(value, ast.Call):
+        return not isinstance(value, (ast.GeneratorExp, ast.NamedExpr))
+    name = _last(value.func)
+    allowed = VALUES | frozen | FIXED
+    made = name.lstrip("_")[:1].isupper() and not name.endswith("Property")  # a declaration
+    owner = _first(value.func)  # of Matrix.Identity
+    return name not in ALWAYS_MUTABLE and (not made or name in allowed or owner in allowed)
+
+
+class _File(NamedTuple):
+    """A file that was read. Attributes: body  its statements; nodes  all that is in it, by kind."""
+
+    body: list[ast.stmt]
+    nodes: dict[type, list[Any]]
+
+    def of(self, *kinds: type) -> list[Any]:
+        """The nodes of some kinds."""
+        return [node for kind in kinds for node in self.nodes.get(kind, ())]
+
+
+@lru_cache(maxsize=1000)
+def _read(text: str) -> _File:
+    nodes: dict[type, list[Any]] = {}
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        nodes.setdefault(type(node), []).append(node)
+    return _File(tree.body, nodes)
+
+
+def _frozen(file: _File) -> set[str]:
+    """The classes of a module whose objects cannot change."""
+    found = set()
+    for node in file.of(ast.ClassDef):
+        heads = " ".join(map(ast.unparse, [*node.bases, *node.decorator_list]))
+        if "NamedTuple" in heads or "frozen=True" in heads:
+            found.add(node.name)
+    return found
+
+
+def _statements(body: list[ast.stmt], inside: str = "") -> Iterator[tuple[str, ast.stmt]]:
+    """The statements that run once when a module is read, with the class that they stand in."""
+    for node in body:
+        yield inside, node
+        if isinstance(node, ast.ClassDef):
+            yield from _statements(node.body, f"{inside}{node.name}.")
+        elif not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            for name in ("body", "orelse", "finalbody"):
+                yield from _statements(getattr(node, name, []), inside)
+            for handler in getattr(node, "handlers", []):
+                yield from _statements(handler.body, inside)
+
+
+def _names(target: ast.expr) -> list[str]:
+    if isinstance(target, (ast.Tuple, ast.List)):
+        return [name for part in target.elts for name in _names(part)]
+    return [target.id] if isinstance(target, ast.Name) else []
+
+
+def _registry(file: _File) -> str:
+    """The name that a file has for session, empty where it knows none."""
+    imports = file.of(ast.ImportFrom)
+    names = (alias for node in imports for alias in node.names if alias.name == "session")
+    return next((alias.asname or alias.name for alias in names), "")
+
+
+def _of_names(file: _File) -> Iterator[tuple[int, str]]:
+    """The names of a module and its classes that stand for something which changes."""
+    frozen, session = _frozen(file), _registry(file)
+    for inside, node in _statements(file.body):
+        if isinstance(node, ast.Assign):
+            names = [name for target in node.targets for name in _names(target)]
+        elif isinstance(node, ast.AnnAssign):
+            names = _names(node.target)
+        else:
+            continue
+        if node.value is None or _is_fixed(node.value, session):
+            continue
+        for name in names:
+            by_blender = bool(inside) and name.startswith("bl_")
+            constant = CONSTANT.fullmatch(name) and _is_constant(node.value, frozen)
+            if not constant and not by_blender:
+                yield node.lineno, f"{inside}{name} can change"
+
+
+def _modules(path: str, file: _File, files: Mapping[str, str]) -> set[str]:
+    """The names by which a file calls other modules of the add-on."""
+    found = set()
+    for node in file.of(ast.ImportFrom):
+        if node.level:
+            folder = PurePosixPath(path).parents[node.level - 1]
+            folder /= (node.module or "").replace(".", "/")
+            for alias in node.names:
+                place = (folder / alias.name).as_posix()
+                if f"{place}.py" in files or f"{place}/__init__.py" in files:
+                    found.add(alias.asname or alias.name)
+    return found
+
+
+def _targets(node: ast.AST) -> list[ast.expr]:
+    if isinstance(node, (ast.Assign, ast.Delete)):
+        return [
+            part for t in node.targets for part in (t.elts if isinstance(t, ast.Tuple) else [t])
+        ]
+    return [node.target] if isinstance(node, (ast.AugAssign, ast.AnnAssign)) else []
+
+
+def _changed(node: ast.AST) -> ast.expr | None:
+    """What a call or an assignment changes in place, as `x` of x[0] = 1 and x.append(1)."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        return node.func.value if node.func.attr in CHANGES else None
+    for target in _targets(node):
+        if isinstance(target, (ast.Subscript, ast.Attribute)):
+            return target.value
+        if isinstance(node, ast.AugAssign):
+            return target
+    return None
+
+
+def _of_changes(file: _File, modules: set[str]) -> Iterator[tuple[int, str]]:
+    """The places that change a constant, a class or another module."""
+    for node in file.of(ast.Global):
+        yield node.lineno, f"global {', '.join(node.names)}"
+    classes = {node.name for node in file.of(ast.ClassDef)}
+    for node in file.of(ast.Call, ast.Assign, ast.AnnAssign, ast.AugAssign, ast.Delete):
+        changed = _changed(node)
+        if changed is not None and CONSTANT.fullmatch(_last(changed)):
+            yield node.lineno, f"{_last(changed)} is changed"
+        for target in _targets(node):
+            if isinstance(target, ast.Attribute) and isinstance(target.value, ast.Name):
+                owner = target.value.id
+                by_blender = target.attr.startswith("bl_")
+                if owner in classes | modules | {"cls"} and not by_blender:
+                    yield node.lineno, f"{owner}.{target.attr} is rebound"
+
+
+def _cached(file: _File) -> Iterator[tuple[int, str]]:
+    """The functions of a module that functools keeps results of."""
+    for node in file.of(ast.FunctionDef, ast.AsyncFunctionDef):
+        for decorator in node.decorator_list:
+            call = decorator.func if isinstance(decorator, ast.Call) else decorator
+            if _last(call) in CACHES:
+                yield node.lineno, node.name
+
+
+def _of_defaults(file: _File) -> Iterator[tuple[int, str]]:
+    """Defaults of arguments that change: Python makes them once."""
+    for arguments in file.of(ast.arguments):
+        for value in [*arguments.defaults, *filter(None, arguments.kw_defaults)]:
+            if isinstance(value, (ast.Dict, ast.List, ast.Set)):
+                yield value.lineno, "a default can change"
+
+
+def _adopted(text: str) -> set[str]:
+    """`module.function` of all that registration.py hands to session.adopt."""
+    found = (call for call in _read(text).of(ast.Call) if ast.unparse(call.func) == "session.adopt")
+    return {ast.unparse(value) for call in found for value in call.args}
+
+
+def _of_caches(path: str, file: _File, adopted: set[str]) -> Iterator[tuple[int, str]]:
+    for line, name in _cached(file):
+        known = f"{PurePosixPath(path).stem}.{name}" in adopted
+        if not (known and path.startswith(WITHOUT_SESSION)):
+            yield line, f"{name} is cached without session"
+
+
+def entries(files: Mapping[str, str]) -> list[str]:
+    """The names that are given to the registry, in the order of the files."""
+    read = [_read(text) for path, text in files.items() if path != SESSION]
+    return [
+        ast.literal_eval(node.args[0])
+        for file in read
+        for node in file.of(ast.Call)
+        if _last(node.func) in {"table", "keep", "value"}
+        and _first(node.func) == (_registry(file) or None)
+    ]
+
+
+def found(files: Mapping[str, str]) -> list[str]:
+    """`path:line: what` of everything that remembers outside the registry.
+
+    Args:
+        files: path below addon/risorius -> text, of all Python files of the add-on.
+    """
+    adopted = _adopted(files.get(REGISTRATION, ""))
+    rows: list[tuple[str, int, str]] = []
+    for path, text in files.items():
+        if path == SESSION:
+            continue
+        file = _read(text)
+        uses = [
+            *_of_names(file),
+            *_of_changes(file, _modules(path, file, files)),
+            *_of_defaults(file),
+            *_of_caches(path, file, adopted),
+        ]
+        rows += [(path, line, what) for line, what in uses]
+    return [f"{path}:{line}: {what}" for path, line, what in sorted(rows)]
