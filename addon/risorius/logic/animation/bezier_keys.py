@@ -33,6 +33,20 @@ class Bezier:
     right: Float
 
 
+def straight(frames: Float, values: Float) -> Bezier:
+    """A key for each sample, with handles on the straight lines between them.
+
+    Args:
+        frames: float64[n], ascending, n at least 1.
+        values: float64[n].
+    """
+    co = np.stack([frames, values], axis=1)
+    right, left = np.add(co, _ASIDE), np.subtract(co, _ASIDE)
+    third = np.diff(co, axis=0) / 3.0
+    right[:-1], left[1:] = co[:-1] + third, co[1:] - third
+    return Bezier(co, left, right)
+
+
 class _Basis(NamedTuple):
     """What cubics over as many samples share: float64[m], samples first, then the middles."""
 
@@ -76,6 +90,15 @@ class Fitter:
         if np.abs(values - values[0]).max() <= self._most:
             point = np.array([[frames[0], values[0]]])
             return Bezier(point, np.subtract(point, _ASIDE), np.add(point, _ASIDE))
+        return self.between(frames, values)
+
+    def between(self, frames: Float, values: Float) -> Bezier:
+        """As `keys`, with a key at the first and the last sample, also where nothing moves.
+
+        Args:
+            frames: float64[n], ascending, n at least 2.
+            values: float64[n], finite.
+        """
         steps = np.diff(frames)
         even = bool(np.ptp(steps) < 1e-6)
         kept, handles = [0], []

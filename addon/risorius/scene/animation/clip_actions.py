@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units
-from ...logic.animation.bezier_keys import Fitter
+from ...logic.animation.bezier_keys import Bezier, Fitter, straight
 from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
@@ -128,7 +128,7 @@ def make_action(
     turn_fitter = Fitter(tolerance * _TURN) if tolerance > 0.0 else None
     for curve in keys.controls:
         made = _new(bag, groups.of_slider(curve.name), parts.property_path(curve.name), 0)
-        add_keys(made, curve.frames, curve.values, fitter)
+        _fill(made, curve.frames, curve.values, fitter)
     for bone, (frames, turns) in keys.turns.items():
         if bone in controls.pose.bones:
             posed = controls.pose.bones[bone]
@@ -194,36 +194,34 @@ def _new(
     return curve
 
 
-def add_keys(
+def _fill(
     curve: bpy.types.FCurve,
     frames: NDArray[np.float64],
     values: NDArray[np.float64],
-    fitter: Fitter | None = None,
+    fitter: Fitter | None,
 ) -> None:
-    """Add keys for samples; those that the curve has stay as they are.
+    keys = straight(frames, values) if fitter is None else fitter.keys(frames, values)
+    add_keys(curve, keys, bent=fitter is not None)
+
+
+def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
+    """Add keys; those that the curve has stay as they are.
 
     Args:
         curve: of an action.
-        frames: float64[n], ascending, on which the curve has no keys.
-        values: float64[n].
-        fitter: makes few keys with handles; None for one a sample with straight lines between.
+        keys: on frames where the curve has none.
+        bent: whether the curve bends between them; else it is straight.
     """
     points = curve.keyframe_points
-    first = len(points)
-    if fitter is None:
-        keys = np.stack([frames, values], axis=1)
-        settings: dict[str, NDArray[np.float64]] = {"co": keys}
-    else:
-        bent = fitter.keys(frames, values)
-        settings = {"co": bent.co, "handle_left": bent.left, "handle_right": bent.right}
-    points.add(len(settings["co"]))
-    if fitter is not None:
-        for name in ("handle_left_type", "handle_right_type"):
-            _set_from(points, name, first, np.full(len(settings["co"]), _FREE, np.int32))
-    for name, rows in settings.items():
+    first, count = len(points), len(keys.co)
+    points.add(count)
+    kinds = {"interpolation": _BEZIER if bent else LINEAR}
+    kinds |= {"handle_left_type": _FREE, "handle_right_type": _FREE}
+    for name, kind in kinds.items():
+        _set_from(points, name, first, np.full(count, kind, np.int32))
+    places = {"co": keys.co, "handle_left": keys.left, "handle_right": keys.right}
+    for name, rows in places.items():
         _set_from(points, name, first, rows.astype(np.float32).ravel())
-    kinds = np.full(len(settings["co"]), LINEAR if fitter is None else _BEZIER, np.int32)
-    _set_from(points, "interpolation", first, kinds)
     curve.update()
 
 
@@ -252,7 +250,7 @@ def _add_turn(
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
     for index, values in enumerate(_as_rotation(bone, own).T):
-        add_keys(_new(bag, group, path, index), frames, values, fitter)
+        _fill(_new(bag, group, path, index), frames, values, fitter)
 
 
 def rotation_path(bone: bpy.types.PoseBone) -> str:

@@ -9,9 +9,10 @@ import bpy
 
 from ... import native
 from ...logic.animation.bezier_keys import TOLERANCE
-from ...logic.animation.clip_units import ClipError
+from ...logic.animation.clip_units import ClipError, Timing
 from ...logic.base.errors import FaceError
 from ...scene.animation import clip_actions, speech_task
+from ...scene.speech import spoken_keys
 from .. import words
 from ..animation.operators import SOUNDS
 from ..animation.place_clip import PlacesClip
@@ -102,6 +103,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             seed=self.seed,
             blinks=self.use_blinks,
             accents=self.use_accents,
+            correctable=True,
             # Made for these frames, not sampled at them: lips that meet shall meet on one.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
@@ -128,14 +130,20 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             notes = [n for n in task.result.metadata.get("notes", "").split("; ") if n]
             name = Path(self.filepath).stem
             few = 0.0 if self.use_every_frame else self.tolerance
-            self.place(
+            action = self.place(
                 context, task.result, name, notes, whole=self.use_whole_frames, tolerance=few
             )
+            timing = self._timing(context, task.result)
+            spoken_keys.note(action, task.result, timing, few, self.intensity)
         except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         self._add_sound(context)
         return {"FINISHED"}
+
+    def _timing(self, context: Context, clip: "native.Clip") -> Timing:
+        whole = self.use_whole_frames
+        return clip_actions.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
 
     def layer_settings(self, context: Context) -> dict[str, object]:
         """A voice has the face while it sounds, and gives it back; a hand's layer would hold on."""
