@@ -142,6 +142,8 @@ OTHERS = {
     "set_shape_mode test_channel unbake",
     "makes an action or keys of its own": "import_animation import_arkit_rig speak blink "
     "curves_from_mesh",
+    "what a voice says; its own keys follow": "sound_set sound_insert sound_remove word_set "
+    "speech_markers speech_update",
     "what the eyes' target hangs on": "gaze_target",
     "what is shown, and where edits go": "next_key tweak colour_curves favourite shortcut",
     "keys what stands": "key key_handles",

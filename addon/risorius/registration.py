@@ -12,6 +12,7 @@ from .scene.base import compat, console, session
 from .scene.character import gaze_settings
 from .scene.life import handlers
 from .scene.live import capture
+from .scene.speech import spoken_properties
 from .ui import (
     about,
     animation,
@@ -54,6 +55,7 @@ from .ui.why import properties as why_properties
 CLASSES = (
     *layer_properties.CLASSES,
     *range_properties.CLASSES,
+    *spoken_properties.CLASSES,
     *about.CLASSES,
     *file.CLASSES,
     *life.CLASSES,
@@ -140,6 +142,7 @@ def register() -> None:
         bpy.utils.register_class(cls)
     layer_properties.register()
     range_properties.register()
+    spoken_properties.register()
     gaze_settings.register()
     for name, choice in _window_properties().items():
         setattr(bpy.types.WindowManager, name, choice)
@@ -211,6 +214,7 @@ def unregister() -> None:
     for name in reversed(_window_properties()):
         delattr(bpy.types.WindowManager, name)
     gaze_settings.unregister()
+    spoken_properties.unregister()
     range_properties.unregister()
     layer_properties.unregister()
     for cls in reversed(CLASSES):

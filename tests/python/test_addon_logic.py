@@ -45,6 +45,7 @@ lod_distance = importlib.import_module("risorius_addon_logic.character.lod_dista
 space = importlib.import_module("risorius_addon_logic.base.space")
 plans = importlib.import_module("risorius_addon_logic.character.plans")
 recogniser = importlib.import_module("risorius_addon_logic.animation.recogniser")
+bezier_keys = importlib.import_module("risorius_addon_logic.animation.bezier_keys")
 
 
 def test_logic_needs_neither_blender_nor_the_native_module() -> None:
@@ -561,3 +562,28 @@ ERROR: No matching distribution found for pocketsphinx==5.1.1
 )
 def test_the_reason_why_a_package_is_not_installed(said: str, why: str) -> None:
     assert recogniser.reason(said, "Python 3.14 on Linux x86_64") == why
+
+
+def _along(keys: Any, frames: Any) -> Any:
+    """What keys with handles at thirds give at frames."""
+    place = np.clip(np.searchsorted(keys.co[:, 0], frames, "right") - 1, 0, len(keys.co) - 2)
+    first, after = keys.co[place], keys.co[place + 1]
+    t = (frames - first[:, 0]) / (after[:, 0] - first[:, 0])
+    middle = 3 * t * (1 - t) ** 2 * keys.right[place, 1]
+    middle += 3 * t**2 * (1 - t) * keys.left[place + 1, 1]
+    return (1 - t) ** 3 * first[:, 1] + middle + t**3 * after[:, 1]
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_few_keys_stay_near_every_sample_and_between_them(even: bool) -> None:
+    random = np.random.default_rng(5)
+    frames = np.arange(80.0) if even else np.cumsum(random.uniform(0.2, 2.0, 80))
+    smooth = np.convolve(random.uniform(0, 1, 100), np.hanning(21) / 10, "valid")
+    values = np.where(frames < frames[60], smooth, 0.0)  # a jump, then nothing moves
+    keys = bezier_keys.Fitter(0.01).keys(frames, values)
+    assert len(keys.co) < 40
+    assert np.abs(_along(keys, frames) - values).max() <= 0.01
+    middles = 0.5 * (frames[1:] + frames[:-1])
+    off = np.abs(_along(keys, middles) - np.interp(middles, frames, values))
+    assert off.max() <= 0.04
+    assert len(bezier_keys.Fitter(0.01).keys(frames, values * 0.009).co) == 1

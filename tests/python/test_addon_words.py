@@ -145,6 +145,7 @@ def sources() -> Iterator[Path]:
     yield ADDON / "registration.py"
     yield ADDON / "scene" / "animation" / "layer_properties.py"
     yield ADDON / "scene" / "animation" / "range_properties.py"
+    yield ADDON / "scene" / "speech" / "spoken_properties.py"
     yield ADDON / "scene" / "character" / "gaze_settings.py"
 
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units
+from ...logic.animation.bezier_keys import Bezier, Fitter, straight
 from ...logic.base.sentences import Sentence, told
 from ..base import compat, parts
 from ..base.blender_types import Animated, ArmatureObject
@@ -23,6 +24,9 @@ from ..character import armatures, runtime, shown_keys
 from . import curve_colours
 
 LINEAR = 1  # the number of the interpolation "LINEAR"
+_BEZIER = 2
+_FREE = 0  # the number of the handle type "FREE"
+_TURN = 0.1  # of the tolerance is that of a turn, whose numbers are small
 _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 
@@ -92,6 +96,7 @@ def make_action(
     timing: clip_units.Timing,
     name: str,
     with_eyes: bool = True,
+    tolerance: float = 0.0,
 ) -> Report:
     """Make an action of a clip; nothing plays it yet.
 
@@ -101,6 +106,8 @@ def make_action(
         timing: see timing_of.
         name: of the action.
         with_eyes: also turn the eye bones, where the clip has eye rotation.
+        tolerance: how far a slider may be from the clip, so that few keys with handles do; turns
+            of bones keep to a tenth of it. 0: a key for each sample, and straight lines.
 
     Returns:
         Report.
@@ -117,12 +124,15 @@ def make_action(
     action = bpy.data.actions.new(name)
     bag = compat.add_curves(action, controls)
     groups = _Groups(bag)
+    fitter = Fitter(tolerance) if tolerance > 0.0 else None
+    turn_fitter = Fitter(tolerance * _TURN) if tolerance > 0.0 else None
     for curve in keys.controls:
-        group = groups.of_slider(curve.name)
-        _add(bag, group, parts.property_path(curve.name), 0, curve.frames, curve.values)
+        made = _new(bag, groups.of_slider(curve.name), parts.property_path(curve.name), 0)
+        _fill(made, curve.frames, curve.values, fitter)
     for bone, (frames, turns) in keys.turns.items():
         if bone in controls.pose.bones:
-            _add_turn(bag, groups.named(bone), controls.pose.bones[bone], frames, turns)
+            posed = controls.pose.bones[bone]
+            _add_turn(bag, groups.named(bone), posed, frames, turns, turn_fitter)
         else:
             keys.unknown.extend(n for n in clip.names if n.partition(".")[0] == bone)
     first, last = _span(timing.frames(times), timing.whole)
@@ -176,23 +186,56 @@ def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
         scene.frame_end = max(scene.frame_end, last)
 
 
-def _add(
-    bag: bpy.types.ActionChannelbag,
-    group: bpy.types.ActionGroup,
-    path: str,
-    index: int,
-    frames: NDArray[np.float64],
-    values: NDArray[np.float64],
-) -> None:
-    """One F-curve with straight lines between its keys."""
+def _new(
+    bag: bpy.types.ActionChannelbag, group: bpy.types.ActionGroup, path: str, index: int
+) -> bpy.types.FCurve:
     curve = bag.fcurves.new(path, index=index)
     curve.group = group
-    points = np.empty((len(frames), 2), np.float32)
-    points[:, 0], points[:, 1] = frames, values
-    curve.keyframe_points.add(len(frames))
-    curve.keyframe_points.foreach_set("co", points.ravel())
-    curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), LINEAR, np.int32))
+    return curve
+
+
+def _fill(
+    curve: bpy.types.FCurve,
+    frames: NDArray[np.float64],
+    values: NDArray[np.float64],
+    fitter: Fitter | None,
+) -> None:
+    keys = straight(frames, values) if fitter is None else fitter.keys(frames, values)
+    add_keys(curve, keys, bent=fitter is not None)
+
+
+def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
+    """Add keys; those that the curve has stay as they are.
+
+    Args:
+        curve: of an action.
+        keys: on frames where the curve has none.
+        bent: whether the curve bends between them; else it is straight.
+    """
+    points = curve.keyframe_points
+    first, count = len(points), len(keys.co)
+    points.add(count)
+    kinds = {"interpolation": _BEZIER if bent else LINEAR}
+    kinds |= {"handle_left_type": _FREE, "handle_right_type": _FREE}
+    for name, kind in kinds.items():
+        _set_from(points, name, first, np.full(count, kind, np.int32))
+    places = {"co": keys.co, "handle_left": keys.left, "handle_right": keys.right}
+    for name, rows in places.items():
+        _set_from(points, name, first, rows.astype(np.float32).ravel())
     curve.update()
+
+
+def _set_from(
+    points: bpy.types.FCurveKeyframePoints, name: str, first: int, new: NDArray[Any]
+) -> None:
+    """Set a property of the keys from `first` on."""
+    if first:
+        width = len(new) // (len(points) - first)
+        whole = np.empty(len(points) * width, new.dtype)
+        points.foreach_get(name, whole)
+        whole[first * width :] = new
+        new = whole
+    points.foreach_set(name, new)
 
 
 def _add_turn(
@@ -201,12 +244,13 @@ def _add_turn(
     bone: bpy.types.PoseBone,
     frames: NDArray[np.float64],
     turns: NDArray[np.float64],
+    fitter: Fitter | None,
 ) -> None:
     """The rotation of a bone, in the way that the bone is turned."""
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
     for index, values in enumerate(_as_rotation(bone, own).T):
-        _add(bag, group, path, index, frames, values)
+        _fill(_new(bag, group, path, index), frames, values, fitter)
 
 
 def rotation_path(bone: bpy.types.PoseBone) -> str:

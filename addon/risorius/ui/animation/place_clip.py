@@ -68,6 +68,7 @@ class PlacesClip(FaceOperator):
         notes: Sequence[str] = (),
         with_eyes: bool = True,
         whole: bool = False,
+        tolerance: float = 0.0,
     ) -> bpy.types.Action:
         """Put a clip onto the active face and report on it.
 
@@ -78,6 +79,7 @@ class PlacesClip(FaceOperator):
             notes: lines for the report.
             with_eyes: whether to turn the eye bones too.
             whole: whether keys lie on whole frames only.
+            tolerance: of few keys with handles, see clip_actions.make_action; 0 for all keys.
 
         Returns:
             Its action.
@@ -92,7 +94,7 @@ class PlacesClip(FaceOperator):
         timing = clip_actions.timing_of(
             clip, context.scene, self.start, keep_clock=True, whole=whole
         )
-        made = clip_actions.make_action(rig, clip, timing, name, with_eyes)
+        made = clip_actions.make_action(rig, clip, timing, name, with_eyes, tolerance)
         notes = [*notes, *made.notes]
         if self.target != "LAYER":
             notes += [say(note) for note in board_keys.onto_leader(rig, made.action)]

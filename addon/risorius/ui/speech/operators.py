@@ -8,9 +8,11 @@ from pathlib import Path
 import bpy
 
 from ... import native
-from ...logic.animation.clip_units import ClipError
+from ...logic.animation.bezier_keys import TOLERANCE
+from ...logic.animation.clip_units import ClipError, Timing
 from ...logic.base.errors import FaceError
 from ...scene.animation import clip_actions, speech_task
+from ...scene.speech import spoken_keys
 from .. import words
 from ..animation.operators import SOUNDS
 from ..animation.place_clip import PlacesClip
@@ -53,8 +55,22 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
     use_whole_frames: bpy.props.BoolProperty(
         name="Whole Frames",
-        description="A key at each frame of the scene; off: 60 a second, between frames",
+        description="Keys on the scene's frames only; off: the voice is sampled 60 times a second, "
+        "and keys lie between frames too",
         default=True,
+    )
+    use_every_frame: bpy.props.BoolProperty(
+        name="Every Frame",
+        description="A key at each frame; off: as few keys with handles as the curves need",
+    )
+    tolerance: bpy.props.FloatProperty(
+        name="Tolerance",
+        description="How far a slider may be from the voice's curve at any frame, where keys are "
+        "few; the range of a slider is 1",
+        default=TOLERANCE,
+        min=0.0005,
+        max=0.1,
+        precision=4,
     )
     use_sound: bpy.props.BoolProperty(
         name="Sound Strip", description="Add the sound to the sequencer", default=True
@@ -87,6 +103,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             seed=self.seed,
             blinks=self.use_blinks,
             accents=self.use_accents,
+            correctable=True,
             # Made for these frames, not sampled at them: lips that meet shall meet on one.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
@@ -112,12 +129,21 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
                 return {"CANCELLED"}
             notes = [n for n in task.result.metadata.get("notes", "").split("; ") if n]
             name = Path(self.filepath).stem
-            self.place(context, task.result, name, notes, whole=self.use_whole_frames)
+            few = 0.0 if self.use_every_frame else self.tolerance
+            action = self.place(
+                context, task.result, name, notes, whole=self.use_whole_frames, tolerance=few
+            )
+            timing = self._timing(context, task.result)
+            spoken_keys.note(action, task.result, timing, few, self.intensity)
         except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         self._add_sound(context)
         return {"FINISHED"}
+
+    def _timing(self, context: Context, clip: "native.Clip") -> Timing:
+        whole = self.use_whole_frames
+        return clip_actions.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
 
     def layer_settings(self, context: Context) -> dict[str, object]:
         """A voice has the face while it sounds, and gives it back; a hand's layer would hold on."""
@@ -146,8 +172,12 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             "use_accents",
             "use_sound",
             "use_whole_frames",
+            "use_every_frame",
         ):
             layout.prop(self, name)
+        row = layout.row()
+        row.enabled = not self.use_every_frame
+        row.prop(self, "tolerance")
 
 
 CLASSES = (RISORIUS_OT_speak,)

@@ -13,8 +13,8 @@ from ..base import signatures
 from ..base.reading import TEXT
 from ..files import fileio
 from ..importing import writing
-from ..speech import Heard, Phoneme, animate, listen
-from ..speech.listening import confidence
+from ..speech import Heard, animate, listen, sheets
+from ..speech.listening import confidence, follow
 from .files import (
     CommandLineError,
     InputError,
@@ -43,6 +43,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     known = parser.add_mutually_exclusive_group()
     known.add_argument("--text", help="what is said")
     known.add_argument("--transcript", metavar="FILE", help="a text file of what is said")
+    known.add_argument(
+        "--read",
+        metavar="FILE",
+        help="phonemes with their times, as --phonemes or a forced aligner wrote them and somebody "
+        "corrected them; nothing is recognised",
+    )
     parser.add_argument(
         "--rate", type=number(1.0, 1000.0), default=60.0, metavar="FPS", help="(default 60)"
     )
@@ -55,7 +61,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument("--no-blinks", action="store_true")
     parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
     parser.add_argument(
-        "--phonemes", type=Path, metavar="OUT.tsv", help="also write the phonemes with their times"
+        "--phonemes",
+        type=Path,
+        metavar="OUT",
+        help="also write words and phonemes with their times: OUT.TextGrid for Praat, OUT.tsv",
     )
     parser.add_argument("--json", action="store_true", help="report as JSON")
     parser.set_defaults(func=run)
@@ -78,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     heard, clip = _spoken(args)
     files = {args.out: _content(clip, args.out)}
     if args.phonemes is not None:
-        files[args.phonemes] = phoneme_table(heard.phonemes).encode()
+        files[args.phonemes] = sheets.write(heard.phonemes, args.phonemes.name).encode()
     fileio.write_all(files)
     for note in heard.notes:
         print(f"risorius: {args.voice}: {note}", file=sys.stderr)
@@ -103,7 +112,10 @@ def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
     def progress(part: float) -> None:
         print(f"\rlistening {part:4.0%}", end="\n" if part >= 1.0 else "", file=sys.stderr)
 
-    heard = listen(args.voice, said, progress=progress if shown else None)
+    if args.read is not None:
+        heard = follow(args.voice, sheets.read(read_bytes(args.read, TEXT), str(args.read)))
+    else:
+        heard = listen(args.voice, said, progress=progress if shown else None)
     clip = animate(
         heard, rate=args.rate, seed=args.seed, intensity=args.intensity,
         blinks=not args.no_blinks, accents=not args.no_accents,
@@ -112,13 +124,6 @@ def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
     if said is not None:
         metadata["transcript"] = said
     return heard, clip.replaced(metadata=metadata)
-
-
-def phoneme_table(found: list[Phoneme]) -> str:
-    """Tab separated: begin and end in seconds, phoneme, confidence, the word that begins."""
-    rows = ["begin\tend\tphoneme\tconfidence\tword"]
-    rows += [f"{p.begin:.3f}\t{p.end:.3f}\t{p.name}\t{p.confidence:.3f}\t{p.word}" for p in found]
-    return "\n".join(rows) + "\n"
 
 
 def _report(heard: Heard, clip: Clip) -> dict[str, object]:

@@ -9,18 +9,20 @@ sound file --listen--> phonemes with times --viseme_weights--> visemes --control
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ..anim.clip import Clip, Event
 from ..base.errors import ArgumentError
-from . import articulation, gestures, prosody
+from . import articulation, gestures, prosody, sheets
 from .audio import RATE, AudioError
 from .listening import Cancel, CancelledError, Heard, Progress, listen
 from .phones import Phoneme
 
-__all__ = ["AudioError", "CancelledError", "Heard", "Phoneme", "animate", "listen", "phonemes",
-           "speak"]  # fmt: skip
+__all__ = ["AudioError", "CancelledError", "Heard", "Phoneme", "animate", "listen", "mouth",
+           "phonemes", "sheets", "speak"]  # fmt: skip
 
 _TAIL = 0.3  # seconds after the sound, in which the mouth comes to rest
 
@@ -52,6 +54,7 @@ def speak(
     intensity: float = 1.0,
     blinks: bool = True,
     accents: bool = True,
+    correctable: bool = False,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Clip:
@@ -65,13 +68,15 @@ def speak(
         intensity: scales the shapes of the mouth, the brows and the nods; lips close all the same.
         blinks: whether to blink.
         accents: whether brows and head follow what is stressed.
+        correctable: whether the metadata shall hold what `mouth` needs beside the phonemes.
         progress: called with 0 to 1 now and then.
         cancel: asked now and then; true ends the work with CancelledError.
 
     Returns:
         A clip of raw controls and head.pitch, from the begin of the sound to 0.3 s after its end.
         Its events are "word" and "phoneme", the value says which; metadata: source, transcript,
-        speech ("aligned" or "recognised"), notes where something went otherwise than asked.
+        speech ("aligned" or "recognised"), notes where something went otherwise than asked;
+        of a correctable one seconds (of the sound) and openness (whole thousandths).
 
     Raises:
         AudioError: the file cannot be used. ValueError: a transcript without English words, a rate
@@ -79,7 +84,10 @@ def speak(
     """
     _check(rate, intensity)
     heard = listen(path, transcript, progress=progress, cancel=cancel)
-    clip = animate(heard, rate=rate, seed=seed, intensity=intensity, blinks=blinks, accents=accents)
+    clip = animate(
+        heard, rate=rate, seed=seed, intensity=intensity, blinks=blinks, accents=accents,
+        correctable=correctable,
+    )  # fmt: skip
     metadata = {**clip.metadata, "source": os.path.basename(os.fspath(path))}
     if transcript is not None:
         metadata["transcript"] = transcript
@@ -94,12 +102,13 @@ def animate(
     intensity: float = 1.0,
     blinks: bool = True,
     accents: bool = True,
+    correctable: bool = False,
 ) -> Clip:
     """The clip of what was heard.
 
     Args:
         heard: of `listen`.
-        rate, seed, intensity, blinks, accents: as of speak.
+        rate, seed, intensity, blinks, accents, correctable: as of speak.
 
     Raises:
         ValueError: a rate or an intensity that makes no sense.
@@ -107,10 +116,8 @@ def animate(
     _check(rate, intensity)
     duration = len(heard.samples) / RATE
     times = np.arange(int(np.ceil((duration + _TAIL) * rate)) + 1) / rate
-    # Silence around the sound, or the mouth would never come to rest after the last word.
-    rest = [Phoneme(-1.0, 0.0, "SIL"), *heard.phonemes, Phoneme(duration, duration + 1.0, "SIL")]
-    weights = articulation.viseme_weights(rest, times)
-    curves = articulation.controls(weights, prosody.openness(heard.samples, times), intensity)
+    opened = prosody.openness(heard.samples)
+    curves = mouth(heard.phonemes, opened, times, intensity)
     if blinks:
         begins = gestures.blink_times(heard.phonemes, duration, seed)
         curves.update(gestures.blinks(times, begins))
@@ -120,9 +127,38 @@ def animate(
     metadata = {"speech": "aligned" if heard.aligned else "recognised"}
     if heard.notes:
         metadata["notes"] = "; ".join(heard.notes)
+    if correctable:
+        metadata["seconds"] = repr(duration)
+        metadata["openness"] = " ".join(str(round(1000.0 * value)) for value in opened)
     return Clip(
         curves, list(curves.values()), rate, events=_events(heard.phonemes), metadata=metadata
     )
+
+
+def mouth(
+    phonemes: Sequence[Phoneme],
+    opened: npt.ArrayLike,
+    times: npt.NDArray[np.float64],
+    intensity: float = 1.0,
+) -> dict[str, npt.NDArray[np.float64]]:
+    """The curves of lips, jaw and tongue alone; what a voice does besides, it does not touch.
+
+    Args:
+        phonemes: in order, without gaps; the mouth rests before and after them.
+        opened: [n], how far vowels open: of prosody.openness, or the thousandths of a correctable
+            clip's metadata / 1000.
+        times: seconds, ascending in equal steps, [frames].
+        intensity: as of speak.
+
+    Returns:
+        Raw control -> float64[frames] in [0, 1].
+    """
+    begin, end = (phonemes[0].begin, phonemes[-1].end) if phonemes else (0.0, 0.0)
+    # Silence around the sound, or the mouth would never come to rest after the last word.
+    rest = [Phoneme(begin - 1.0, begin, "SIL"), *phonemes, Phoneme(end, end + 1.0, "SIL")]
+    weights = articulation.viseme_weights(rest, times)
+    open_far = prosody.openness_at(np.asarray(opened, np.float64), times)
+    return articulation.controls(weights, open_far, intensity)
 
 
 def _check(rate: float, intensity: float) -> None:
@@ -134,12 +170,6 @@ def _check(rate: float, intensity: float) -> None:
 
 def _events(found: list[Phoneme]) -> list[Event]:
     events = [Event(p.begin, "phoneme", p.end - p.begin, p.name) for p in found]
-    for i, phone in enumerate(found):
-        if phone.word:
-            end = phone.end
-            for other in found[i + 1 :]:
-                if other.word or other.name == "SIL":
-                    break
-                end = other.end
-            events.append(Event(phone.begin, "word", end - phone.begin, phone.word))
+    for begin, end, word in sheets.words_of(found):
+        events.append(Event(begin, "word", end - begin, word))
     return events

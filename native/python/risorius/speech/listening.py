@@ -85,7 +85,7 @@ def listen(
     levels = loudness(samples)
     if not speaking(levels).any():
         tell(1.0)
-        return Heard(_filled([], len(samples) / RATE), samples, False, [_NO_SPEECH])
+        return Heard(filled([], len(samples) / RATE), samples, False, [_NO_SPEECH])
     notes: list[str] = []
     found = None
     if words is not None:
@@ -101,7 +101,29 @@ def listen(
         notes.append(_NO_SPEECH)
     found = with_silences(found, levels)
     tell(1.0)
-    return Heard(_filled(found, len(samples) / RATE), samples, aligned, notes)
+    return Heard(filled(found, len(samples) / RATE), samples, aligned, notes)
+
+
+def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
+    """A sound file whose phonemes are known already; nobody listens, PocketSphinx is not needed.
+
+    Args:
+        path: as audio.read_audio takes it.
+        found: in order; what lies between them is silence.
+
+    Raises:
+        AudioError: the file cannot be used. ArgumentError: a phoneme begins after the sound's end.
+    """
+    samples = resample(*read_audio(path))
+    duration = len(samples) / RATE
+    late = next((p for p in found if p.begin >= duration and p.name != "SIL"), None)
+    if late is not None:
+        raise ArgumentError(
+            f"the phoneme {late.name} at {late.begin:g} s begins after the end of the voice at "
+            f"{duration:g} s: are the phonemes of another recording?"
+        )
+    cut = [p._replace(end=min(p.end, duration)) for p in found]
+    return Heard(filled(cut, duration), samples, True, [])
 
 
 def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
@@ -301,8 +323,13 @@ def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
     return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 
 
-def _filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:
-    """With silence wherever nothing is said, and neighbours of silence joined."""
+def filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:
+    """The phonemes of a whole sound: silence where nothing is said, neighbours of silence joined.
+
+    Args:
+        found: in order.
+        duration: of the sound, seconds.
+    """
     whole: list[Phoneme] = []
     place = 0.0
     for phone in [*found, Phoneme(duration, duration, "SIL")]:

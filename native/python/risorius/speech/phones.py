@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ..expressions import VISEMES
+from ..expressions import VISEMES, get
 
-__all__ = ["CLASS_OF", "GLIDES", "VISEMES", "VOWEL_VISEMES", "Phoneme", "viseme_of"]
+__all__ = ["CLASS_OF", "GLIDES", "VISEMES", "VOWEL_VISEMES", "Phoneme", "label_of", "phone_named",
+           "viseme_of"]  # fmt: skip
 
 VOWEL_VISEMES = frozenset({"aa", "E", "I", "O", "U"})
 
@@ -44,3 +45,30 @@ GLIDES = {"AY": ("aa", "I"), "AW": ("aa", "U"), "EY": ("E", "I"), "OW": ("O", "U
 def viseme_of(phone: str) -> str:
     """The class of a phoneme; noises and whatever else is not speech look like silence."""
     return CLASS_OF.get(phone, "sil")
+
+
+def label_of(phone: str) -> str:
+    """What animators call the mouth of a phoneme: M B P, F V, Oo."""
+    return get(viseme_of(phone)).label
+
+
+def phone_named(text: str) -> str | None:
+    """The phoneme that a person or another program means, or None.
+
+    Args:
+        text: a phoneme of the CMU dictionary (AH, also AH0), a mouth as animators call it (M B P),
+            its viseme (PP), or nothing, sil, sp or spn for silence; capitals do not matter.
+
+    Returns:
+        The phoneme; of a mouth the first that looks so.
+    """
+    said = " ".join(text.split())
+    phone = said.upper().rstrip("012") if said[:-1].isalpha() else said.upper()
+    if phone in CLASS_OF:
+        return phone
+    if phone in ("", "SP", "SPN"):
+        return "SIL"
+    for viseme, phones in _CLASSES.items():
+        if said.lower() in (viseme.lower(), get(viseme).label.lower()):
+            return phones.split()[0]
+    return None

@@ -15,6 +15,9 @@ from .phones import VOWEL_VISEMES, Phoneme, viseme_of
 
 Curve = npt.NDArray[np.float64]
 
+OPENNESS_STEP = 0.04
+"""Seconds between two values of `openness`: a quarter of the time over which it is smooth."""
+
 _PITCH_RATE = 8000  # samples a second: enough for a fundamental
 _LOWEST, _HIGHEST = 60.0, 400.0  # Hz
 _VOICED = 0.45  # of the power repeats after a period
@@ -57,12 +60,15 @@ def pitch(samples: Samples) -> Curve:
     return found
 
 
-def openness(samples: Samples, times: Curve) -> Curve:
-    """How far vowels open at each time, from loudness: about 0.6 to 1.25, without jitter.
+def openness(samples: Samples) -> Curve:
+    """How far vowels open, from loudness: about 0.6 to 1.25 every OPENNESS_STEP, without jitter.
 
     Args:
         samples: of the voice, at RATE.
-        times: seconds, [frames].
+
+    Returns:
+        float64[n] in whole thousandths, so that text holds them as they are; the first is the
+        value half a STEP after the begin.
     """
     levels = loudness(samples)
     loud = levels[speaking(levels)]
@@ -71,7 +77,17 @@ def openness(samples: Samples, times: Curve) -> Curve:
     kernel = np.hanning(17)  # 160 ms: syllables, not glottal pulses
     kernel /= kernel.sum()
     smooth = np.convolve(np.pad(relative, 8, mode="edge"), kernel, mode="valid")
-    return np.interp(times, (np.arange(len(levels)) + 0.5) * STEP, 1.0 + 0.4 * smooth)
+    return np.round((1.0 + 0.4 * smooth[:: round(OPENNESS_STEP / STEP)]) * 1000.0) / 1000.0
+
+
+def openness_at(opened: Curve, times: Curve) -> Curve:
+    """What `openness` gave, at any times.
+
+    Args:
+        opened: of `openness`.
+        times: seconds, [frames].
+    """
+    return np.interp(times, np.arange(len(opened)) * OPENNESS_STEP + 0.5 * STEP, opened)
 
 
 def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -> list[Accent]:

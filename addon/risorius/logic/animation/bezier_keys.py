@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Samples to few keys with handles: curves that stay within a tolerance of every sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+TOLERANCE = 0.005  # of the range 0 to 1 of a control
+_LONGEST = 1000  # samples from one key to the next
+_BETWEEN = 4.0  # times the tolerance: in the middle between samples
+_HALVES = 0.1  # what such a middle weighs beside a sample
+_ROUNDING = 1e-6  # Blender keeps keys and handles as float32
+_ASIDE = np.array([1.0, 0.0])  # where no curve goes a handle lies a frame beside its key
+
+
+@dataclass
+class Bezier:
+    """Keys of a curve that bends between them.
+
+    Attributes:
+        co: float64[keys, 2], frames and values.
+        left, right: float64[keys, 2], the ends of the handles. Each lies a third of the way to the
+            next key: a curve's frame grows evenly along it, and its value is a cubic of the frame.
+    """
+
+    co: Float
+    left: Float
+    right: Float
+
+
+def straight(frames: Float, values: Float) -> Bezier:
+    """A key for each sample, with handles on the straight lines between them.
+
+    Args:
+        frames: float64[n], ascending, n at least 1.
+        values: float64[n].
+    """
+    co = np.stack([frames, values], axis=1)
+    right, left = np.add(co, _ASIDE), np.subtract(co, _ASIDE)
+    third = np.diff(co, axis=0) / 3.0
+    right[:-1], left[1:] = co[:-1] + third, co[1:] - third
+    return Bezier(co, left, right)
+
+
+class _Basis(NamedTuple):
+    """What cubics over as many samples share: float64[m], samples first, then the middles."""
+
+    near: Float
+    far: Float
+    begin: Float
+    end: Float
+    solve: Float
+    """float64[2, m]: what gives the handles of least squares."""
+
+
+class Fitter:
+    """Fits many curves; what curves of the same frames share is computed once."""
+
+    def __init__(self, tolerance: float) -> None:
+        """Args: tolerance  how far a curve may be from a sample, absolute, above 0."""
+        self._most = max(tolerance - _ROUNDING, _ROUNDING)
+        self._bases: dict[int, _Basis] = {}
+        self._done: dict[tuple[bytes, bytes], Bezier] = {}
+
+    def keys(self, frames: Float, values: Float) -> Bezier:
+        """The keys and handles that samples need.
+
+        From each key the curve reaches as far as a cubic stays within the tolerance of all samples
+        on the way, and within four times as much of straight lines in the middle between them.
+
+        Args:
+            frames: float64[n], ascending, n at least 1.
+            values: float64[n], finite.
+
+        Returns:
+            Bezier; each key has the value of its sample. Samples that stay within the tolerance of
+            the first have one key.
+        """
+        known = frames.tobytes(), values.tobytes()  # left and right sides are mostly the same
+        if known not in self._done:
+            self._done[known] = self._fit(frames, values)
+        return self._done[known]
+
+    def _fit(self, frames: Float, values: Float) -> Bezier:
+        if np.abs(values - values[0]).max() <= self._most:
+            point = np.array([[frames[0], values[0]]])
+            return Bezier(point, np.subtract(point, _ASIDE), np.add(point, _ASIDE))
+        return self.between(frames, values)
+
+    def between(self, frames: Float, values: Float) -> Bezier:
+        """As `keys`, with a key at the first and the last sample, also where nothing moves.
+
+        Args:
+            frames: float64[n], ascending, n at least 2.
+            values: float64[n], finite.
+        """
+        steps = np.diff(frames)
+        even = bool(np.ptp(steps) < 1e-6)
+        kept, handles = [0], []
+        while kept[-1] < len(frames) - 1:
+            last, pair = self._reach(frames, values, kept[-1], even)
+            kept.append(last)
+            handles.append(pair)
+        co = np.stack([frames[kept], values[kept]], axis=1)
+        third = np.diff(co[:, 0]) / 3.0
+        out, into = np.array(handles).T
+        right, left = co + _ASIDE, co - _ASIDE
+        right[:-1] = np.stack([co[:-1, 0] + third, out], axis=1)
+        left[1:] = np.stack([co[1:, 0] - third, into], axis=1)
+        return Bezier(co, left, right)
+
+    def _reach(
+        self, frames: Float, values: Float, first: int, even: bool
+    ) -> tuple[int, tuple[float, float]]:
+        """The furthest sample that one cubic from `first` reaches, and the ends of its handles."""
+        low, high = values[first], values[first + 1]
+        best = first + 1, (low + (high - low) / 3.0, high - (high - low) / 3.0)
+        for last in range(first + 2, min(first + _LONGEST, len(frames) - 1) + 1):
+            basis = self._basis(frames[first : last + 1], even)
+            inner = values[first : last + 1]
+            wanted = np.concatenate([inner[1:-1], 0.5 * (inner[1:] + inner[:-1])])
+            wanted -= basis.begin * inner[0] + basis.end * inner[-1]
+            out, into = basis.solve @ wanted
+            off = np.abs(basis.near * out + basis.far * into - wanted)
+            count = len(inner) - 2
+            if off[:count].max() > self._most or off[count:].max() > _BETWEEN * self._most:
+                break
+            best = last, (float(out), float(into))
+        return best
+
+    def _basis(self, frames: Float, even: bool) -> _Basis:
+        if even and len(frames) in self._bases:
+            return self._bases[len(frames)]
+        shares = (frames - frames[0]) / (frames[-1] - frames[0])
+        t = np.concatenate([shares[1:-1], 0.5 * (shares[1:] + shares[:-1])])
+        rest = 1.0 - t
+        near, far = 3.0 * t * rest * rest, 3.0 * t * t * rest
+        columns = np.stack([near, far], axis=1)
+        weighted = columns * np.where(np.arange(len(t)) < len(shares) - 2, 1.0, _HALVES)[:, None]
+        solve = np.linalg.solve(weighted.T @ columns, weighted.T)
+        basis = _Basis(near, far, np.power(rest, 3.0), np.power(t, 3.0), solve)
+        if even:
+            self._bases[len(frames)] = basis
+        return basis

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a voice says as a list of sounds, and corrections of it; each gives a new list.
+
+Sounds follow each other without gaps: each lasts until the next one begins. So no correction can
+make a hole or an overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+from ..base.errors import FaceError
+from ..base.sentences import told
+
+SHORTEST = 0.25  # frames that a sound keeps, whatever is moved
+SILENCE = "SIL"
+
+
+class Sound(NamedTuple):
+    """A phoneme, or silence."""
+
+    begin: float
+    """Frame."""
+    name: str
+    """As in the CMU dictionary; SIL for silence."""
+    word: str = ""
+    """The word that begins with it."""
+
+
+class SpokenError(FaceError):
+    """A correction that cannot be made."""
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Where the frames of an action lie in a scene.
+
+    Attributes:
+        offset: the scene's frame of the action's frame 0.
+        scale: frames of the scene that one of the action takes; below 0 where it runs backwards.
+    """
+
+    offset: float = 0.0
+    scale: float = 1.0
+
+    def shown(self, frame: float) -> float:
+        """The scene's frame of a frame of the action."""
+        return self.offset + self.scale * frame
+
+    def own(self, frame: float) -> float:
+        """The inverse of `shown`."""
+        return (frame - self.offset) / self.scale
+
+
+def end_of(sounds: Sequence[Sound], place: int, end: float) -> float:
+    """The frame at which a sound ends.
+
+    Args:
+        sounds: the list.
+        place: of the sound.
+        end: of the whole.
+    """
+    return sounds[place + 1].begin if place + 1 < len(sounds) else end
+
+
+def word_of(sounds: Sequence[Sound], place: int) -> range | None:
+    """The places of the word that a sound belongs to; None for silence and sounds without one.
+
+    Args:
+        sounds: the list.
+        place: of the sound.
+    """
+    first = place
+    while first > 0 and not sounds[first].word and sounds[first].name != SILENCE:
+        first -= 1
+    if not sounds[first].word:
+        return None
+    last = first + 1
+    while last < len(sounds) and not sounds[last].word and sounds[last].name != SILENCE:
+        last += 1
+    return range(first, last) if place < last else None
+
+
+def changed(old: Sequence[Sound], new: Sequence[Sound], end: float) -> tuple[float, float] | None:
+    """The first and the last frame between which two lists differ in what is heard, or None.
+
+    Args:
+        old, new: lists of sounds.
+        end: of both.
+    """
+    before = [(s.begin, s.name) for s in old]
+    after = [(s.begin, s.name) for s in new]
+    if before == after:
+        return None
+    head = 0
+    while head < min(len(before), len(after)) and before[head] == after[head]:
+        head += 1
+    tail = 0
+    while tail < min(len(before), len(after)) - head and before[-1 - tail] == after[-1 - tail]:
+        tail += 1
+    first = min((s[head].begin for s in (old, new) if head < len(s)), default=end)
+    return first, (old[len(old) - tail].begin if tail else end)
+
+
+def moved(
+    sounds: Sequence[Sound], wanted: Mapping[int, float], end: float
+) -> tuple[list[Sound], list[int]]:
+    """Sounds that begin elsewhere; their order stays, and what is not moved stays where it is.
+
+    Args:
+        sounds: the list.
+        wanted: place -> frame at which it shall begin.
+        end: of the whole.
+
+    Returns:
+        The new list; the places of those that could not go all the way past a neighbour.
+    """
+    begins = [wanted.get(i, s.begin) for i, s in enumerate(sounds)]
+    low, high = -float("inf"), end - SHORTEST
+    for i in range(len(sounds)):
+        if i in wanted:
+            begins[i] = max(begins[i], low)
+        low = begins[i] + SHORTEST
+    for i in reversed(range(len(sounds))):
+        if i in wanted:
+            begins[i] = min(begins[i], high)
+        high = begins[i] - SHORTEST
+    if any(b <= a for a, b in pairwise(begins)):  # no room between neighbours that stay
+        begins = [s.begin for s in sounds]
+    held = [i for i in sorted(wanted) if abs(begins[i] - wanted[i]) > 1e-4]
+    return [s._replace(begin=b) for s, b in zip(sounds, begins, strict=True)], held
+
+
+def replaced(sounds: Sequence[Sound], place: int, name: str) -> list[Sound]:
+    """The list with another phoneme at a place. Args: sounds  the list, name  the phoneme."""
+    out = list(sounds)
+    word = "" if name == SILENCE else out[place].word
+    out[place] = out[place]._replace(name=name, word=word)
+    return out
+
+
+def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> list[Sound]:
+    """The list with one more sound; it takes the rest of the one that it begins in.
+
+    Args:
+        sounds: the list.
+        begin: frame.
+        name: phoneme.
+        end: of the whole.
+
+    Raises:
+        SpokenError: there is no room for it.
+    """
+    after = next((i for i, s in enumerate(sounds) if s.begin > begin), len(sounds))
+    low = sounds[after - 1].begin + SHORTEST if after else -float("inf")
+    high = (sounds[after].begin if after < len(sounds) else end) - SHORTEST
+    if low > high:
+        raise SpokenError(
+            told("frame {frame:g}: this sound is too short for one more in it", frame=begin)
+        )
+    return [*sounds[:after], Sound(min(max(begin, low), high), name), *sounds[after:]]
+
+
+def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
+    """The list without some sounds: the one before each takes its time, at the begin the next one.
+
+    Args:
+        sounds: the list.
+        places: of those that go.
+
+    Raises:
+        SpokenError: no sound would be left.
+    """
+    gone, word, out = set(places), "", list[Sound]()
+    for i, sound in enumerate(sounds):
+        if i in gone:
+            word = sound.word or word
+            continue
+        keeps = sound.word or (word if sound.name != SILENCE else "")
+        out.append(sound._replace(word=keeps))
+        word = ""
+    if not out:
+        raise SpokenError(told("a voice keeps one sound at least: replace it by Rest instead"))
+    out[0] = out[0]._replace(begin=min(out[0].begin, sounds[0].begin))
+    return out
+
+
+def respelled(
+    sounds: Sequence[Sound], place: int, said: Sequence[tuple[str, Sequence[str]]], end: float
+) -> list[Sound]:
+    """The list with another word, or several, in the time of the word at a place.
+
+    Args:
+        sounds: the list.
+        place: of one of the word's sounds; one without a word is replaced alone.
+        said: each word with its phonemes.
+        end: of the whole.
+
+    Raises:
+        SpokenError: so many phonemes do not fit into that time.
+    """
+    where = word_of(sounds, place) or range(place, place + 1)
+    begin, until = sounds[where[0]].begin, end_of(sounds, where[-1], end)
+    names = [
+        (name, word if i == 0 else "") for word, phones in said for i, name in enumerate(phones)
+    ]
+    step = (until - begin) / len(names)
+    if step < SHORTEST:
+        raise SpokenError(
+            told(
+                "{count} sounds do not fit into {frames:.1f} frames: make the word longer first",
+                count=len(names),
+                frames=until - begin,
+            )
+        )
+    new = [Sound(begin + i * step, name, word) for i, (name, word) in enumerate(names)]
+    return [*sounds[: where[0]], *new, *sounds[where[-1] + 1 :]]
+
+
+class Mark(NamedTuple):
+    """A marker of a timeline that stands for a sound."""
+
+    place: int
+    """Of the sound that it was put up for."""
+    frame: float
+    """Of the scene."""
+    name: str
+
+
+def label_of(sound: Sound, mouth: str) -> str:
+    """What a marker is called: the word that begins, and the mouth.
+
+    Args:
+        sound: for which it stands.
+        mouth: as M B P.
+    """
+    return f"{sound.word}: {mouth}" if sound.word else mouth
+
+
+def from_marks(
+    sounds: Sequence[Sound],
+    marks: Sequence[Mark],
+    placing: Placing,
+    end: float,
+    label: Callable[[str], str],
+    named: Callable[[str], str | None],
+) -> tuple[list[Sound], list[int]]:
+    """The list that markers say: moved, renamed, copied and deleted ones are corrections.
+
+    Args:
+        sounds: the list for which the markers were put up.
+        marks: those that are there now.
+        placing: where the list lies in the scene.
+        end: of the list.
+        label: phoneme -> what its mouth is called.
+        named: what somebody wrote -> phoneme, or None.
+
+    Returns:
+        The new list; places in `sounds` of those that were moved past a neighbour and stay beside.
+
+    Raises:
+        SpokenError: no marker is left, or one has a name that stands for no sound.
+    """
+    by_place: dict[int, list[Mark]] = {}
+    for mark in marks:
+        if 0 <= mark.place < len(sounds):
+            by_place.setdefault(mark.place, []).append(mark)
+    if not by_place:
+        raise SpokenError(told("no marker of this voice is left: show its markers again"))
+    wanted: dict[int, float] = {}
+    more: list[tuple[float, str]] = []
+    out = list(sounds)
+    for place, there in by_place.items():
+        shown = round(placing.shown(sounds[place].begin))
+        there.sort(key=lambda mark: abs(mark.frame - shown))
+        for mark in there[1:]:  # copies
+            more.append((placing.own(mark.frame), _renamed(mark, out[place], label, named).name))
+        out[place] = _renamed(there[0], out[place], label, named)
+        if there[0].frame != shown:
+            wanted[place] = placing.own(there[0].frame)
+    out, held = moved(out, wanted, end)
+    gone = [i for i in range(len(sounds)) if i not in by_place]
+    out = removed(out, gone) if gone else out
+    for frame, name in more:
+        out = inserted(out, frame, name, end)
+    return out, held
+
+
+def _renamed(
+    mark: Mark,
+    sound: Sound,
+    label: Callable[[str], str],
+    named: Callable[[str], str | None],
+) -> Sound:
+    """The sound that a marker's name says. Raises: SpokenError."""
+    word, colon, mouth = mark.name.rpartition(":")
+    word, mouth = word.strip() if colon else sound.word, mouth.strip()
+    if mouth != label(sound.name):
+        name = named(mouth)
+        if name is None or not mouth:
+            raise SpokenError(
+                told(
+                    "the marker {name} at frame {frame:g}: a mouth such as M B P or a phoneme "
+                    "such as AA was expected",
+                    name=mark.name,
+                    frame=mark.frame,
+                )
+            )
+        sound = sound._replace(name=name)
+    return sound._replace(word="" if sound.name == SILENCE else word)

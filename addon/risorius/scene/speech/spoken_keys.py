@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The list of sounds of an action, and the mouth's keys that follow a correction of it.
+
+Of each curve only the keys between the last one before the first frame that the correction changes
+and the first one after the last such frame are made anew; all other keys stay byte for byte.
+"""
+
+from __future__ import annotations
+
+import json
+import uuid
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol, cast
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import native
+from ...logic.animation import clip_units, spoken
+from ...logic.animation.bezier_keys import TOLERANCE, Fitter, straight
+from ...logic.animation.spoken import Sound, SpokenError
+from ...logic.base.sentences import told
+from ..animation import clip_actions, layer_mixing
+from ..base import compat, parts
+
+PROPERTY = "risorius_spoken"
+_NEAR = TOLERANCE  # what changes less has not changed
+_REACH = 1.2  # seconds before and after a sound in which it can move the mouth
+_ROUND = 2.5  # seconds of sounds around that are looked at
+_BESIDE = 1e-3  # frames: nearer keys are one
+
+Floats = NDArray[np.float64]
+
+
+class Row(Protocol):
+    """A sound as RISORIUS_PG_sound has it."""
+
+    begin: float
+    name: str
+    word: str
+
+
+class Rows(Protocol):
+    """The list of them."""
+
+    def __len__(self) -> int: ...
+    def __getitem__(self, place: int) -> Row: ...
+    def __iter__(self) -> Iterator[Row]: ...
+    def add(self) -> Row: ...
+    def remove(self, place: int) -> None: ...
+
+
+class Spoken(Protocol):
+    """What RISORIUS_PG_spoken has, which uses this module."""
+
+    sounds: Rows
+    active: int
+    start: float
+    """Frame of the clip's first sample."""
+    end: float
+    """Frame at which the sound file ends."""
+    fps: float
+    """Frames a second of the scene, when the action was made."""
+    rate: float
+    """Samples a second of the clip."""
+    samples: int
+    whole: bool
+    tolerance: float
+    intensity: float
+    openness: str
+    """As in the metadata of a correctable clip."""
+    built: str
+    """The sounds of which the keys were made, as JSON."""
+    mark: str
+    """Names the voice, whatever its action is called."""
+
+
+def of(action: bpy.types.Action) -> Spoken:
+    """What an action says. Args: action  any; of one without a voice the list is empty."""
+    return cast(Spoken, getattr(action, PROPERTY))
+
+
+def sounds_of(action: bpy.types.Action) -> list[Sound]:
+    """The sounds of an action as they stand in its list, frames of the action."""
+    return [Sound(row.begin, row.name, row.word) for row in of(action).sounds]
+
+
+def note(
+    action: bpy.types.Action,
+    clip: native.Clip,
+    timing: clip_units.Timing,
+    tolerance: float,
+    intensity: float,
+) -> None:
+    """Keep with an action what its voice says.
+
+    Args:
+        action: made of the clip.
+        clip: of a correctable voice.
+        timing: where it lies.
+        tolerance: of the action's keys; 0 where each sample has one.
+        intensity: with which the clip was made.
+    """
+    said = of(action)
+    said.start, said.fps, said.rate = float(timing.frames(np.zeros(1))[0]), timing.rate, clip.rate
+    said.whole, said.tolerance, said.intensity = timing.whole, tolerance, intensity
+    said.samples, said.openness = clip.frame_count, clip.metadata["openness"]
+    said.end = float(timing.frames(np.array([float(clip.metadata["seconds"])]))[0])
+    words = {event.time: event.value for event in clip.events if event.name == "word"}
+    found = [event for event in clip.events if event.name == "phoneme"]
+    begins = timing.frames(np.array([event.time for event in found]))
+    sounds = [
+        Sound(float(begin), event.value, words.get(event.time, ""))
+        for begin, event in zip(begins, found, strict=True)
+    ]
+    _fill(said, sounds)
+    said.built = _packed(sounds_of(action))
+    said.mark = uuid.uuid4().hex  # names change, and copies of an action are the same voice
+
+
+def change(action: bpy.types.Action, sounds: Sequence[Sound]) -> int:
+    """Give an action another list of sounds, and its mouth the keys for it.
+
+    Returns:
+        How many curves have new keys.
+
+    Raises:
+        SpokenError: see rebuild; then the list stays as it was.
+    """
+    _check(action)
+    _fill(of(action), sounds)
+    return rebuild(action)
+
+
+def _fill(said: Spoken, sounds: Sequence[Sound]) -> None:
+    active = said.active
+    while len(said.sounds) > len(sounds):
+        said.sounds.remove(len(said.sounds) - 1)
+    for i, sound in enumerate(sounds):
+        row = said.sounds[i] if i < len(said.sounds) else said.sounds.add()
+        row.begin, row.name, row.word = sound
+    place = min(active, len(sounds) - 1)
+    if place != active:
+        said.active = place
+
+
+def _packed(sounds: Sequence[Sound]) -> str:
+    return json.dumps([[sound.begin, sound.name] for sound in sounds])
+
+
+def _built(action: bpy.types.Action) -> list[Sound]:
+    """The sounds of which the keys were made. Raises: SpokenError."""
+    try:
+        found = [Sound(float(begin), str(name)) for begin, name in json.loads(of(action).built)]
+    except (ValueError, TypeError):
+        found = []
+    if not found:
+        raise SpokenError(
+            told(
+                "{action} has lost what its keys were made of: speak from audio again",
+                action=action.name,
+            )
+        )
+    return found
+
+
+def rebuild(action: bpy.types.Action) -> int:
+    """Make the keys anew that the list has changed since they were made.
+
+    Locked curves stay as they are, and curves that were deleted stay away.
+
+    Returns:
+        How many curves have new keys.
+
+    Raises:
+        SpokenError: the list is damaged, or no slider of the mouth has keys in this action.
+    """
+    curves = _check(action)
+    said, old, new = of(action), _built(action), sounds_of(action)
+    span = spoken.changed(old, new, said.end)
+    if span is None:
+        return 0
+    mouth = _Mouth(action)
+    first, last = mouth.window(*span)
+    before, after = mouth.curves(old, first, last), mouth.curves(new, first, last)
+    count = 0
+    for name in after:
+        curve = curves.get(parts.property_path(name))
+        moving = np.flatnonzero(np.abs(after[name] - before[name]) > _NEAR)
+        if curve is None or curve.lock or not len(moving):
+            continue
+        ends = mouth.frames(np.array([first + moving[0], first + moving[-1]]))
+        _replace(curve, mouth, new, name, (float(ends[0]), float(ends[1])))
+        count += 1
+    said.built = _packed(new)
+    layer_mixing.note_edits([action])  # of a layer's nobody else tells
+    action.update_tag()
+    for rig in parts.rigs():
+        controls = parts.controls_of(rig)
+        if controls is not None:
+            controls.update_tag()
+    return count
+
+
+def trouble(action: bpy.types.Action) -> str:
+    """Why the voice of an action cannot be corrected, a Sentence; or ""."""
+    try:
+        _check(action)
+    except SpokenError as error:
+        return cast("str", error.args[0])
+    return ""
+
+
+def _check(action: bpy.types.Action) -> dict[str, bpy.types.FCurve]:
+    """The curves of an action by their paths. Raises: SpokenError."""
+    said = of(action)
+    begins = [row.begin for row in said.sounds]
+    if not begins:
+        raise SpokenError(told("{action} holds no voice", action=action.name))
+    _built(action)
+    if not (np.diff(begins) > 0.0).all() or not said.fps > 0.0 or not said.rate > 0.0:
+        raise SpokenError(
+            told(
+                "{action}: sounds that begin one after the other were expected", action=action.name
+            )
+        )
+    if action.library is not None:
+        raise SpokenError(
+            told("{action} is of another file: make it local to correct it", action=action.name)
+        )
+    curves = {c.data_path: c for c in compat.curves_of(action)}
+    if not any(parts.property_path(name) in curves for name in _Mouth(action).names()):
+        raise SpokenError(
+            told(
+                "{action} moves no slider of the mouth: where the board leads, its handles have "
+                "the voice's keys",
+                action=action.name,
+            )
+        )
+    return curves
+
+
+class _Mouth:
+    """The mouth of a voice at any sample of its clip."""
+
+    def __init__(self, action: bpy.types.Action) -> None:
+        self.said = of(action)
+        self._speech = native.part("speech")
+        self._phoneme = native.part("speech.phones").Phoneme
+        self._opened = np.array([float(n) for n in self.said.openness.split()] or [1000.0]) / 1000.0
+
+    def names(self) -> list[str]:
+        return list(self.curves([Sound(self.said.start, spoken.SILENCE)], 0, 2))
+
+    def frames(self, samples: NDArray[Any]) -> Floats:
+        """Frames of the action for numbers of samples."""
+        return self.said.start + samples * (self.said.fps / self.said.rate)
+
+    def sample(self, frame: float) -> float:
+        """The inverse of `frames`, within the clip."""
+        at = (frame - self.said.start) * self.said.rate / self.said.fps
+        return min(max(at, 0.0), self.said.samples - 1.0)
+
+    def window(self, begin: float, end: float) -> tuple[int, int]:
+        """The samples that a change between two frames can reach: first, and behind the last."""
+        far = _REACH * self.said.fps
+        first, last = int(self.sample(begin - far)), int(np.ceil(self.sample(end + far)))
+        return first, last + 1
+
+    def curves(self, sounds: Sequence[Sound], first: int, last: int) -> dict[str, Floats]:
+        """Control -> float64[last - first]."""
+        said = self.said
+        times = np.arange(first, last) / said.rate
+        ends = [*(sound.begin for sound in sounds[1:]), said.end]
+        phones = [
+            self._phoneme((s.begin - said.start) / said.fps, (end - said.start) / said.fps, s.name)
+            for s, end in zip(sounds, ends, strict=True)
+        ]
+        near = [p for p in phones if times[0] - _ROUND < p.end and p.begin < times[-1] + _ROUND]
+        found: dict[str, Floats] = self._speech.mouth(near, self._opened, times, said.intensity)
+        return found
+
+
+def _replace(
+    curve: bpy.types.FCurve,
+    mouth: _Mouth,
+    sounds: Sequence[Sound],
+    name: str,
+    span: tuple[float, float],
+) -> None:
+    """Make the keys anew from the last one before a span to the first one behind it."""
+    points = curve.keyframe_points
+    at = clip_actions.key_points(curve)[0].astype(np.float64)
+    before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1
+    behind = int(np.searchsorted(at, span[1] + _BESIDE))
+    begin = at[before] if before >= 0 else max(span[0] - 1.0, float(mouth.frames(np.zeros(1))[0]))
+    end = at[behind] if behind < len(at) else span[1] + mouth.said.fps / mouth.said.rate
+    frames, values = _samples(curve, mouth, sounds, name, (float(begin), float(end)))
+    bent = mouth.said.tolerance > 0.0
+    fitted = (
+        Fitter(mouth.said.tolerance).between(frames, values) if bent else straight(frames, values)
+    )
+    first, last = 0 if before < 0 else 1, len(fitted.co) - (behind < len(at))
+    if before >= 0:
+        _turn(points[before], bent, right=fitted.right[0])
+    if behind < len(at):
+        _turn(points[behind], bent, left=fitted.left[-1])
+    for place in reversed(range(before + 1, behind)):
+        points.remove(points[place], fast=True)
+    for rows in ("co", "left", "right"):
+        setattr(fitted, rows, getattr(fitted, rows)[first:last])
+    if len(fitted.co):
+        clip_actions.add_keys(curve, fitted, bent)
+    curve.update()
+
+
+def _samples(
+    curve: bpy.types.FCurve,
+    mouth: _Mouth,
+    sounds: Sequence[Sound],
+    name: str,
+    span: tuple[float, float],
+) -> tuple[Floats, Floats]:
+    """What a control does between two frames; at both the curve keeps what it has there."""
+    first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
+    first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
+    frames = mouth.frames(np.arange(first, last))
+    values = mouth.curves(sounds, first, last)[name]
+    if mouth.said.whole:
+        frames, values = clip_units.onto_frames(frames, values)
+    inside = (frames > span[0] + _BESIDE) & (frames < span[1] - _BESIDE)
+    held = [curve.evaluate(frame) for frame in span]
+    return (
+        np.concatenate([span[:1], frames[inside], span[1:]]),
+        np.concatenate([held[:1], values[inside], held[1:]]),
+    )
+
+
+def _turn(
+    key: bpy.types.Keyframe,
+    bent: bool,
+    left: Floats | None = None,
+    right: Floats | None = None,
+) -> None:
+    """Give a key at an end of a span the handle into it; its other handle stays where it is."""
+    kept = key.handle_left[:], key.handle_right[:]
+    if bent:
+        key.handle_left_type = key.handle_right_type = "FREE"
+        key.handle_left = kept[0] if left is None else tuple(left)
+        key.handle_right = kept[1] if right is None else tuple(right)
+    if right is not None:
+        key.interpolation = "BEZIER" if bent else "LINEAR"
