@@ -50,9 +50,7 @@ def _press_i(hand: Hand, frame: int, notches: int) -> None:
     # A drag has no bound here: Blender moves the pointer back while it lasts.
     hand.move(*place)
     hand.do("keydown", "ctrl")
-    for _ in range(notches):
-        hand.do("click", 4)
-        hand.ask("ready")
+    hand.wheel(-notches)
     hand.do("keyup", "ctrl")
     hand.wait("the slider moved", lambda: slider(hand, JAW) != before)
     hand.move(*place)
