@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from common import IN_VIEW
@@ -57,11 +58,26 @@ def in_menu(hand: Hand, pattern: str, x: float, top: float, high: int = 420) -> 
     hand.click(*hand.find(pattern, columns=(0.35,), area=area, step=9))
 
 
-def accept(hand: Hand) -> None:
-    """Return in a dialog that has just been opened under the pointer."""
-    hand.ask("ready")
-    hand.key("Return")
-    hand.ask("ready")
+def accept(hand: Hand, done: Callable[[], bool]) -> None:
+    """Return in a dialog that has just been opened under the pointer, which goes off its fields.
+
+    Args:
+        hand: has the window.
+        done: whether it has done what it is for.
+
+    Raises:
+        LateError: it has not.
+    """
+    for above in (30, 55, 80):  # over its title, which lies above the first row or the second
+        hand.move(IN_VIEW[0], IN_VIEW[1] - above)
+        hand.key("Return")
+        try:
+            hand.wait("a dialog", done, 15.0)
+        except LateError:
+            hand.key("Return")  # it was over a field: that is left
+        else:
+            return
+    raise LateError("the dialog does nothing")
 
 
 def name_file(hand: Hand, path: Path, ending: str = "Return") -> None:

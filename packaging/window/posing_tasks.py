@@ -19,7 +19,7 @@ from common import (
     take_up,
 )
 from hand import Hand, difference
-from menus import search
+from menus import accept, search
 from shot import go_to, key_all
 
 BROW = ("CTRL_expressions.browRaiseOuterL", "CTRL_expressions.browRaiseOuterR")
@@ -113,6 +113,7 @@ def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
     """Dope sheet and graph editor in the place of the timeline, as large as the window."""
     area = hand.ask("ready")["areas"]["DOPESHEET_EDITOR"]
     over_keys = (area[0] + area[2] * 0.7, area[1] + area[3] * 0.6)
+    hand.ask("run", code=KEEP_EDITOR)
     hand.move(*over_keys)
     hand.key("shift+F12")
     hand.key("ctrl+space")
@@ -145,12 +146,14 @@ def _in_editors(hand: Hand, frames: list[int]) -> Iterator[Check]:
 
 SUMMARY = """(lambda r: [rectangle(r)[0] + r.view2d.view_to_region({}, 0, clip=False)[0],
 rectangle(r)[1] + 34])(next(r for r in window().screen.areas[0].regions if r.type == "WINDOW"))"""
+KEEP_EDITOR = """
+bpy.app.driver_namespace["editor"] = next(
+    a.ui_type for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
+"""
 TIMELINE = """
 for area in window().screen.areas:
     if area.type == "GRAPH_EDITOR":
-        area.ui_type = "TIMELINE" if bpy.app.version < (5, 1) else "DOPESHEET"
-        if area.ui_type != "TIMELINE":
-            area.spaces.active.ui_mode = "TIMELINE"
+        area.ui_type = bpy.app.driver_namespace["editor"]
 """
 
 
@@ -174,8 +177,7 @@ def gaze(hand: Hand, _dna: Path) -> Iterator[Check]:
     yield f"the Empty has two keys ({frames})", [round(f[0]) for f in frames] == [1, 24]
     search(hand, "Eyes Follow Object")
     hand.picture("gaze-dialog")
-    hand.key("Return")
-    hand.wait("the eyes follow", lambda: hand.see(TARGET) != "")
+    accept(hand, lambda: hand.see(TARGET) != "")
     yield "Eyes Follow > Object proposes the Empty in hand", hand.see(TARGET) == "Look Here"
     look_at_face(hand)
     box = hand.ask("face_box")

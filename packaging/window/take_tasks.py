@@ -61,7 +61,7 @@ def _smile(hand: Hand) -> Iterator[Check]:
     """A layer of a smile at frame 36, by the search."""
     go_to(hand, 36)
     below = hand.ask("curves_below")
-    search(hand, "Layers Emotions Smile", "RISORIUS_OT_layer_add")
+    search(hand, "Add Layer Smile Closed", "RISORIUS_OT_layer_add")
     names = hand.ask("state")["layers"]
     yield f"F3 adds a layer of a smile ({names})", len(names) == 1
     started = hand.see("[y.start for y in rig()['risorius_controls'].risorius_layers]")
@@ -76,8 +76,7 @@ def _tweak(hand: Hand) -> Iterator[Check]:
     go_to(hand, 50)
     search(hand, "Tweak over a Range")
     hand.picture("tweak-dialog")
-    accept(hand)
-    hand.wait("a tweak is on", lambda: hand.ask("tweaks"))
+    accept(hand, lambda: hand.ask("tweaks"))
     span = hand.see("(lambda t: [t.first, t.last])(module('scene.animation.tweaks')"
                     ".of(rig()['risorius_controls']))")  # fmt: skip
     yield f"the dialog proposes frames around this one ({span})", span == [38, 62]
