@@ -141,18 +141,17 @@ class Hand:
 
     # ---- what stands under the pointer
 
-    def under(self, x: float, y: float, keys: str) -> str:
-        """What the shortcut of the button at a place copies; empty where there is none."""
+    def under(self, x: float, y: float, *keys: str) -> str:
+        """What the shortcuts of the button at a place copy; empty where there is none."""
         there = [round(x), round(y)]
-        words = ["mousemove", there[0], there[1] - 1, "mousemove", *there, "key", keys]
-        self.do(*words)
+        self.do("mousemove", there[0], there[1] - 1, "mousemove", *there, "key", *keys)
         self.ask("ready")
         return str(self.ask("taken")).strip()
 
     def is_button(self, x: float, y: float) -> bool:
         """Whether a button that runs something, or a value, is at a place."""
         self.ask("taken")
-        return bool(self.under(x, y, _PYTHON) or self.under(x, y, _PATH))
+        return bool(self.under(x, y, _PYTHON, _PATH))
 
     def find(self, pattern: str, of_field: bool = False, columns: tuple[float, ...] = (0.5,),
              area: list[int] | None = None, step: int = 10) -> tuple[float, float]:  # fmt: skip
