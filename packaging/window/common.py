@@ -111,6 +111,17 @@ def open_section(hand: Hand, *panels: str) -> None:
     hand.still()
 
 
+def need_section(hand: Hand, panel: str) -> None:
+    """Open a section of the tab unless it is open. Args: panel  the section."""
+    scroll(hand, -40)
+    hand.ask("watch", panel=panel)
+    hand.ask("draw_again", panel=panel)
+    hand.ask("ready")
+    hand.still()
+    if not hand.ask("drawn", panel=panel):
+        open_section(hand, panel)
+
+
 def _opened(hand: Hand, panel: str) -> bool:
     """Click on what may be a header, from below, until the section is drawn."""
     left, top, _width, height = hand.ask("layout")["sidebar"]

@@ -28,6 +28,7 @@ from common import (
     clear,
     has_face,
     look_at_face,
+    need_section,
     open_section,
     open_tab,
     ready_tab,
@@ -123,6 +124,7 @@ def drag_slider(hand: Hand, _dna: Path) -> Iterator[Check]:
     """A slider under the pointer: pressed, dragged, let go; undone by the keyboard."""
     look_at_face(hand)
     ready_tab(hand)
+    need_section(hand, "RISORIUS_PT_controls")
     hand.ask("run", code="bpy.context.window_manager.risorius_search = 'jawOpen'")
     hand.still()
     place = hand.find(r'CTRL_expressions\.jawOpen"\]$', of_field=True, columns=(0.62, 0.8))

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from common import JAW, Check, clear, look_at_face, ready_tab, scroll, slider
+from common import JAW, Check, clear, look_at_face, need_section, ready_tab, scroll, slider
 from hand import Hand
 from shot import go_to, key_all
 
@@ -18,6 +18,7 @@ def keyed(hand: Hand, _dna: Path) -> Iterator[Check]:
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
+    need_section(hand, "RISORIUS_PT_controls")
     hand.ask("run", code=HEAD_IN_HAND)
     key_all(hand)
     yield "Key All with the head in hand: its keys are seen", hand.ask("seen_keys") == [1]

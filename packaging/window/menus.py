@@ -90,7 +90,7 @@ def name_file(hand: Hand, path: Path, ending: str = "Return") -> None:
     """
     hand.wait("the file browser", lambda: "FILE_BROWSER" in hand.ask("state")["areas"])
     hand.still()
-    _write(hand, "UI", 0.4, str(path))
+    _write(hand, "UI", 0.4, str(path) if ending else f"{path}/")
     if ending:
         hand.key(ending)
 
@@ -112,6 +112,8 @@ def _write(hand: Hand, region: str, column: float, text: str) -> None:
     hand.key("ctrl+a")
     hand.type(text)
     hand.key("Return")
+    hand.still()
+    hand.key("Return")  # 5.2 goes on editing a folder
     hand.still()
     left, top, width, height = hand.ask("browser_region", kind="WINDOW")
     hand.move(left + width * 0.5, top + height * 0.6)

@@ -12,6 +12,7 @@ from common import (
     Check,
     clear,
     look_at_face,
+    need_section,
     put_down,
     ready_tab,
     scroll,
@@ -30,6 +31,7 @@ def smirk(hand: Hand, _dna: Path) -> Iterator[Check]:
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
+    need_section(hand, "RISORIUS_PT_controls")
     for words, control in (("smile", SMILE[0]), ("raise outer brow", BROW[0])):
         _type_search(hand, words)
         _wheel(hand, control, 60)

@@ -14,6 +14,7 @@ from common import (
     NotThereError,
     clear,
     look_at_face,
+    need_section,
     ready_tab,
     scroll,
     slider,
@@ -31,6 +32,7 @@ def capture(hand: Hand, _dna: Path) -> Iterator[Check]:
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
+    need_section(hand, "RISORIUS_PT_controls")
     hand.ask("run", code="face()['CTRL_expressions.eyePupilWideL'] = 0.38; rig().update_tag()")
     path = hand.user / "take.csv"
     path.write_text(take(), encoding="ascii")
