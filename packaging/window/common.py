@@ -75,6 +75,9 @@ def clear(hand: Hand) -> None:
 
 REST = """
 c = rig()["risorius_controls"]
+if tweaks():
+    with over(*view()[:2]):
+        bpy.ops.risorius.tweak(enable=False)
 c.animation_data_clear()
 while len([y for y in c.risorius_layers if not y.removed]):
     bpy.ops.risorius.layer_remove()
