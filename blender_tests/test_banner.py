@@ -15,7 +15,7 @@ MODES = {
     "tweak": (lambda: bpy.ops.risorius.tweak(first=1, last=20), "Tweak 1-20"),
     "tweak elsewhere": (
         lambda: bpy.ops.risorius.tweak(first=5, last=20),
-        "Tweak 5-20: not at this frame",
+        "Not Here: Tweak 5-20",
     ),
     "solo": (lambda: bpy.ops.risorius.solo(control=JAW), "Solo: Jaw Open"),
     "mute": (lambda: bpy.ops.risorius.mute(kind="JOINTS"), "Muted"),

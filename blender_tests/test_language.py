@@ -40,6 +40,18 @@ def test_our_words_have_a_context_of_their_own(german):
     assert kinds.translation_context == "Risorius"
 
 
+def test_properties_that_blenders_types_get_have_the_context_too():
+    """As those of our classes, to which registration gives it: Blender looks for words there."""
+    ours = [
+        prop
+        for kind in (bpy.types.Object, bpy.types.WindowManager, bpy.types.Scene)
+        for prop in kind.bl_rna.properties
+        if prop.identifier.startswith("risorius_") and prop.name not in ("", prop.identifier)
+    ]
+    assert len(ours) > 8
+    assert {p.identifier for p in ours if p.translation_context != "Risorius"} == set()
+
+
 def test_tooltips_of_operators_and_controls_are_translated(german, dna_file):
     rig = scene.load(dna_file)
     look_up = bpy.app.translations.pgettext_tip

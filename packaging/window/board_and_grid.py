@@ -9,7 +9,8 @@ from pathlib import Path
 from common import JAW, Check, clear, look_at_face, open_section, ready_tab, scroll, slider
 from hand import WIDTH, Hand, difference
 
-HANDLE = "CTRL_C_jaw"
+HANDLES = """[b.name for b in rig()["risorius_controls"].data.bones if b.get("risorius_board")
+and "FRAMES" not in b.name.upper() and b.name != "board"]"""
 JOY = r"risorius\.expression\(.*expression=.joy."
 BLEND_JOY = r"risorius\.blend_expression\(.*expression=.joy."
 
@@ -21,15 +22,16 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     open_section(hand, "RISORIUS_PT_options", "RISORIUS_PT_board")
     scroll(hand)
     hand.click(*hand.find(r"risorius\.add_board"))
-    hand.wait("a board is there", lambda: HANDLE in hand.ask("bones"))
-    hand.ask("show_all_of_board")
+    handles = hand.wait("a board is there", lambda: hand.see(HANDLES))
+    hand.still()
+    told = f"{len(handles)} handles and the face are in the view, in pose mode"
+    yield told, hand.ask("state")["mode"] == "POSE" and hand.ask("board_in_view", names=handles)
+    hand.picture("board-added")
+    handle = next(name for name in handles if "jaw" in name.lower())
     before, box = hand.still(), hand.ask("face_box")
-    at = hand.ask("bone_at", bone=HANDLE)
+    at = hand.ask("bone_at", bone=handle)
     hand.click(*at)
-    hand.key("ctrl+Tab")
-    hand.wait("pose mode", lambda: hand.ask("state")["mode"] == "POSE")
-    hand.click(*at)
-    yield "a click selects the handle of the jaw", hand.ask("active_bone") == HANDLE
+    yield "a click selects the handle of the jaw", hand.ask("active_bone") == handle
     hand.move(at[0] + 2, at[1])
     hand.key("g")
     hand.go(at, (at[0], at[1] + 60))
@@ -53,7 +55,7 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     yield "Ctrl-Z: the board leads again", abs(given - led) < 0.01
     scroll(hand)
     hand.click(*hand.find(r"risorius\.remove_board"))
-    hand.wait("the board is gone", lambda: HANDLE not in hand.ask("bones"))
+    hand.wait("the board is gone", lambda: not hand.see(HANDLES))
     yield "removed, the sliders keep what it gave", abs(slider(hand) - led) < 0.01
     hand.ask("run", code="bpy.ops.object.mode_set(mode='OBJECT')")
     clear(hand)

@@ -6,8 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from hand import Hand, LateError
+from hand import HEIGHT, WIDTH, Hand, LateError
 
+IN_VIEW = (WIDTH * 0.3, HEIGHT * 0.55)  # beside the face, over nothing
 JAW = "CTRL_expressions.jawOpen"
 SMILE = ("CTRL_expressions.mouthCornerPullL", "CTRL_expressions.mouthCornerPullR")
 Check = tuple[str, bool]
@@ -24,6 +25,21 @@ def slider(hand: Hand, name: str = JAW) -> float:
 
 def has_face(hand: Hand) -> bool:
     return bool(hand.ask("state")["face"])
+
+
+def open_tab(hand: Hand) -> None:
+    """N over the view, and clicks down the tabs of its sidebar until ours is open."""
+    hand.move(*IN_VIEW)
+    hand.key("n")
+    hand.wait("the sidebar", lambda: hand.ask("layout")["sidebar"][2] > 20)
+    hand.still()
+    left, top, width, height = hand.ask("layout")["sidebar"]
+    for y in range(top + 20, top + height, 14):
+        hand.click(left + width - 10, y)
+        hand.still()
+        if hand.see("view()[2].active_panel_category") == "Risorius":
+            return
+    raise LateError("no tab Risorius in the sidebar")
 
 
 def ready_tab(hand: Hand) -> None:
@@ -59,6 +75,9 @@ def clear(hand: Hand) -> None:
 
 REST = """
 c = rig()["risorius_controls"]
+if tweaks():
+    with over(*view()[:2]):
+        bpy.ops.risorius.tweak(enable=False)
 c.animation_data_clear()
 while len([y for y in c.risorius_layers if not y.removed]):
     bpy.ops.risorius.layer_remove()
@@ -95,6 +114,17 @@ def open_section(hand: Hand, *panels: str) -> None:
     hand.still()
 
 
+def need_section(hand: Hand, panel: str) -> None:
+    """Open a section of the tab unless it is open. Args: panel  the section."""
+    scroll(hand, -40)
+    hand.ask("watch", panel=panel)
+    hand.ask("draw_again", panel=panel)
+    hand.ask("ready")
+    hand.still()
+    if not hand.ask("drawn", panel=panel):
+        open_section(hand, panel)
+
+
 def _opened(hand: Hand, panel: str) -> bool:
     """Click on what may be a header, from below, until the section is drawn."""
     left, top, _width, height = hand.ask("layout")["sidebar"]
@@ -116,9 +146,7 @@ def scroll(hand: Hand, notches: int = 25) -> None:
     """Turn the wheel over the sidebar. Args: notches  down; below 0 up."""
     left, top, width, height = hand.ask("layout")["sidebar"]
     hand.move(left + width - 40, top + height / 2)
-    for _ in range(abs(notches)):
-        hand.do("click", 5 if notches > 0 else 4)
-    hand.ask("ready")
+    hand.wheel(notches)
     hand.still()
 
 

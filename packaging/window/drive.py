@@ -28,21 +28,29 @@ from common import (
     clear,
     has_face,
     look_at_face,
+    need_section,
     open_section,
+    open_tab,
     ready_tab,
     scroll,
     slider,
 )
+from file_tasks import face_menu, own_head, studio, two_faces
+from german import german
 from hand import HEIGHT, WIDTH, Hand, LateError, difference
 from keyed import keyed
+from menus import name_file
+from posing_tasks import gaze, smirk, two_seconds
 from shot import shot
 from skin import drag_in_views, drag_skin
+from take_tasks import capture, voice
 
 
 def start(hand: Hand, _dna: Path) -> Iterator[Check]:
     """The empty tab, and its first button."""
     hand.ask("quiet")
-    ready_tab(hand)
+    open_tab(hand)
+    yield "N and a click open the tab", hand.see("view()[2].active_panel_category") == "Risorius"
     hand.picture("empty-tab")
     x, y = hand.find(r"risorius\.add_character")
     before = hand.still()
@@ -59,8 +67,6 @@ def import_file(hand: Hand, dna: Path) -> Iterator[Check]:
     count = "len([o for o in bpy.data.objects if 'risorius_controls' in o])"
     hand.ask("run", code=f"bpy.app.driver_namespace['before'] = {count}")
     open_import(hand)
-    hand.wait("the file browser is open", lambda: "FILE_BROWSER" in hand.ask("state")["areas"])
-    hand.still()
     name_file(hand, dna)
     hand.wait("the view is back", lambda: "VIEW_3D" in hand.ask("state")["areas"])
     hand.wait("the file is imported", lambda: has_face(hand))
@@ -114,25 +120,11 @@ def entry_beside(hand: Hand, y: int) -> tuple[float, float] | None:
     return None
 
 
-def name_file(hand: Hand, dna: Path) -> None:
-    """Write the path into the browser's field, and go."""
-    area = hand.ask("ready")["areas"]["FILE_BROWSER"]
-    x, y = area[0] + area[2] * 0.4, area[1] + area[3] - 20
-    hand.do("mousemove", "--sync", round(x), round(y))
-    hand.do("click", "--repeat", 2, "--delay", 60, 1)
-    hand.ask("ready")
-    hand.key("ctrl+a")
-    hand.type(str(dna))
-    hand.key("Return")
-    hand.still()
-    hand.move(area[0] + area[2] * 0.5, area[1] + area[3] * 0.4)
-    hand.key("Return")
-
-
 def drag_slider(hand: Hand, _dna: Path) -> Iterator[Check]:
     """A slider under the pointer: pressed, dragged, let go; undone by the keyboard."""
     look_at_face(hand)
     ready_tab(hand)
+    need_section(hand, "RISORIUS_PT_controls")
     hand.ask("run", code="bpy.context.window_manager.risorius_search = 'jawOpen'")
     hand.still()
     place = hand.find(r'CTRL_expressions\.jawOpen"\]$', of_field=True, columns=(0.62, 0.8))
@@ -194,10 +186,12 @@ def see_why(hand: Hand, _dna: Path) -> Iterator[Check]:
     look_at_face(hand)
     open_section(hand, "RISORIUS_PT_options", "RISORIUS_PT_why")
     before, box = hand.still(), hand.ask("face_box")
-    hand.click(*hand.find(r"risorius\.heat\(.*POSE"))
+    button = hand.find(r"risorius\.heat\(.*POSE")
+    hand.click(*button)
     hand.wait("a heat map", lambda: hand.ask("state")["heat"])
     after = hand.still()
     yield "Heat Map from Neutral colours the face", difference(before, after, box) > 0.3
+    yield "and its button stays under the pointer", "POSE" in hand.under(*button, "ctrl+c")
     hand.picture("heat")
     hand.click(*hand.find(r"risorius\.why_vertex"))
     corner = hand.ask("moved_by", control=SMILE[0])
@@ -240,7 +234,17 @@ STEPS: tuple[Step, ...] = (
     grid,
     add_layer,
     see_why,
+    smirk,
+    two_seconds,
+    gaze,
+    capture,
+    voice,
+    face_menu,
+    two_faces,
+    own_head,
+    studio,
     shot,
+    german,
     board,
     import_file,
 )
@@ -286,7 +290,7 @@ def main() -> int:
         arguments += ["--python", str(Path(user) / "inside.py"), "--", talk]
         blender = subprocess.Popen([*command, *arguments], stdout=log, stderr=log)
         try:
-            hand = Hand(Path(talk), folder, blender)
+            hand = Hand(Path(talk), folder, Path(user), blender)
             print(f"say\tBlender {hand.ask('ready')['blender']}", flush=True)
             return (
                 1 if run(hand, Path(user) / "man.dna", [w for w in wanted.split(",") if w]) else 0

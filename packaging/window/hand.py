@@ -7,7 +7,8 @@ import json
 import re
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +30,10 @@ class LateError(Exception):
 class Hand:
     """Moves the pointer of a display; asks Blender only to know where things are and what is so."""
 
-    def __init__(self, talk: Path, out: Path, blender: subprocess.Popen[bytes]) -> None:
-        self.talk, self.out, self.blender = talk, out, blender
+    def __init__(self, talk: Path, out: Path, user: Path, blender: subprocess.Popen[bytes]) -> None:
+        self.talk, self.out, self.user, self.blender = talk, out, user, blender
         self.count = 0
+        self.places: dict[str, tuple[float, float]] = {}  # where what was sought lay last
 
     # ---- questions
 
@@ -124,22 +126,32 @@ class Hand:
         self.do("key", keys)
         self.ask("ready")
 
-    def type(self, text: str) -> None:
-        self.do("type", "--delay", 30, text)
+    def wheel(self, notches: int) -> None:
+        """Turn the wheel. Args: notches  down; below 0 up."""
+        self.do("click", "--repeat", abs(notches), "--delay", 12, 5 if notches > 0 else 4)
         self.ask("ready")
+
+    def type(self, text: str) -> None:
+        self.do("type", "--delay", 30, "--", text)
+        self.ask("ready")
+
+    def see(self, code: str) -> Any:
+        """The value of an expression, with the names of inside.py; only numbers, texts, lists."""
+        return self.ask("see", code=code)
 
     # ---- what stands under the pointer
 
-    def under(self, x: float, y: float, keys: str) -> str:
-        """What the shortcut of the button at a place copies; empty where there is none."""
-        self.ask("clipboard", text=" ")
-        self.move(x, y)
-        self.key(keys)
-        return str(self.ask("clipboard")).strip()
+    def under(self, x: float, y: float, *keys: str) -> str:
+        """What the shortcuts of the button at a place copy; empty where there is none."""
+        there = [round(x), round(y)]
+        self.do("mousemove", there[0], there[1] - 1, "mousemove", *there, "key", *keys)
+        self.ask("ready")
+        return str(self.ask("taken")).strip()
 
     def is_button(self, x: float, y: float) -> bool:
         """Whether a button that runs something, or a value, is at a place."""
-        return bool(self.under(x, y, _PYTHON) or self.under(x, y, _PATH))
+        self.ask("taken")
+        return bool(self.under(x, y, _PYTHON, _PATH))
 
     def find(self, pattern: str, of_field: bool = False, columns: tuple[float, ...] = (0.5,),
              area: list[int] | None = None, step: int = 10) -> tuple[float, float]:  # fmt: skip
@@ -160,11 +172,12 @@ class Hand:
         """
         left, top, width, height = (area or self.ask("layout")["sidebar"])[:4]
         keys = _PATH if of_field else _PYTHON
-        for column in columns:
-            x = left + (width - 24) * column
-            for y in range(top + 6, top + height - 4, step):
-                if re.search(pattern, self.under(x, y, keys)):
-                    return x, y
+        self.ask("taken")
+        before = [self.places[pattern]] if pattern in self.places and area is None else []
+        for x, y in chain(before, _grid(left, top, width - 24, height, columns, step)):
+            if re.search(pattern, self.under(x, y, keys)):
+                self.places[pattern] = x, y
+                return x, y
         raise LateError(f"no button or field {pattern!r} in the sidebar")
 
     # ---- the screen
@@ -199,6 +212,14 @@ class Hand:
         pixels = self.still().astype(np.uint8)
         image = Image.fromarray(pixels)
         (image.crop(box) if box else image).save(self.out / f"{name}.png")
+
+
+def _grid(
+    left: float, top: int, width: float, height: int, columns: tuple[float, ...], step: int
+) -> Iterator[tuple[float, float]]:
+    for column in columns:
+        for y in range(top + 6, top + height - 4, step):
+            yield left + width * column, y
 
 
 def difference(one: Pixels, other: Pixels, box: list[float]) -> float:

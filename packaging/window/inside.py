@@ -17,6 +17,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy_extras import view3d_utils
+from bpy_extras.object_utils import world_to_camera_view
+from mathutils import Matrix, Vector
+
+__all__ = ["Vector", "world_to_camera_view"]  # what questions of `see` use
 
 TALK = Path(sys.argv[sys.argv.index("--") + 1])
 _next = [0]
@@ -32,6 +36,10 @@ def view():
     area = next(a for a in window().screen.areas if a.type == "VIEW_3D")
     regions = {r.type: r for r in area.regions}
     return area, regions["WINDOW"], regions["UI"]
+
+
+def header_of_view():
+    return next(r for r in view()[0].regions if r.type == "HEADER")
 
 
 def rectangle(item):
@@ -104,6 +112,19 @@ def clipboard(text=None):
     if text is not None:
         manager.clipboard = text
     return manager.clipboard
+
+
+def taken():
+    """What a button's shortcut copied since this was asked last."""
+    text = clipboard()
+    if text.strip():
+        clipboard(" ")
+    return text
+
+
+def see(code):
+    """The value of an expression, for a check that needs no function of its own."""
+    return eval(code, globals())
 
 
 def state():
@@ -221,6 +242,21 @@ def bone_at(bone):
     return on_screen(bone_in_world(bone))
 
 
+def outline_at(bone):
+    """A point of a control bone's outline on the screen, one that lies in the view."""
+    one = rig()["risorius_controls"].pose.bones[bone]
+    size = one.bone.length if one.use_custom_shape_bone_size else 1.0
+    turn = one.custom_shape_translation, one.custom_shape_rotation_euler.to_quaternion()
+    held = Matrix.LocRotScale(*turn, one.custom_shape_scale_xyz * size)
+    shown = one.custom_shape_transform or one
+    world = rig()["risorius_controls"].matrix_world @ shown.matrix @ held
+    spots = [on_screen(world @ v.co) for v in one.custom_shape.data.vertices]
+    left, top, width, height = rectangle(view()[1])
+    middle = np.array((left + width / 2, top + height / 2))
+    inside = [s for s in spots if s and np.abs(np.array(s) - middle).max() < min(width, height) / 2]
+    return max(inside, key=lambda s: s[0])
+
+
 def bones():
     return [b.name for b in rig()["risorius_controls"].pose.bones]
 
@@ -236,15 +272,12 @@ def is_modal():
     return len(window().modal_operators) > 0
 
 
-def show_all_of_board():
-    """The face and its board in the view."""
-    area, _drawing, _sidebar = view()
-    spots = np.array([p for n in bones() for p in [bone_in_world(n)] if n.startswith("CTRL_")])
-    spots = np.concatenate([points(), spots])
-    eye = area.spaces.active.region_3d
-    eye.view_location = (spots.min(axis=0) + spots.max(axis=0)) / 2
-    eye.view_distance = float(max(np.ptp(spots[:, 0]) * 1.3, np.ptp(spots[:, 2]) * 1.9))
-    return True
+def board_in_view(names):
+    """Whether the face and all of these bones lie in the view."""
+    left, top, width, height = rectangle(view()[1])
+    spots = [on_screen(bone_in_world(n)) for n in names] + [face_box()[:2], face_box()[2:]]
+    inside = [s and left <= s[0] <= left + width and top <= s[1] <= top + height for s in spots]
+    return all(inside)
 
 
 def bone_in_world(name):
@@ -257,6 +290,12 @@ def bone_in_world(name):
 def board_leads():
     """Whether the board leads the face."""
     return bool(module("scene.character.board").leads_face(rig()))
+
+
+def browser_region(kind):
+    """Where a region of the file browser is."""
+    area = next(a for a in window().screen.areas if a.type == "FILE_BROWSER")
+    return rectangle(next(r for r in area.regions if r.type == kind))
 
 
 def timeline_at(frame):
@@ -275,20 +314,39 @@ def timeline_header():
     return [*rectangle(region), bpy.context.scene.frame_end]
 
 
-def keyed_frames():
+def keyed_frames_of_active():
+    """The same of the face whose armature is the active object."""
+    return keyed_frames(bpy.context.view_layer.objects.active)
+
+
+def keyed_frames(controls=None):
     """Frames at which the action of the face has keys."""
-    data = rig()["risorius_controls"].animation_data
+    data = (controls or rig()["risorius_controls"]).animation_data
     curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
     return sorted({round(p.co.x) for c in curves for p in c.keyframe_points})
 
 
-def seen_keys():
-    """Frames of the keys of the face that the timeline's editor lets one see."""
-    area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
+def seen_keys(editor="DOPESHEET_EDITOR"):
+    """Frames of the keys of the face that the timeline, or another editor in its place, shows."""
+    area = next(a for a in window().screen.areas if a.type == editor)
     region = next(r for r in area.regions if r.type == "WINDOW")
     with over(area, region):
         curves = list(bpy.context.visible_fcurves or ())
     return sorted({round(p.co.x) for c in curves for p in c.keyframe_points})
+
+
+def curves_below():
+    """Keys of the face's own action: path and index, frames and values."""
+    data = rig()["risorius_controls"].animation_data
+    curves = module("scene.base.compat").curves_of(data.action) if data and data.action else []
+    keys = [(c.data_path, c.array_index, [list(p.co) for p in c.keyframe_points]) for c in curves]
+    return sorted(keys)
+
+
+def curves_of_empty():
+    """Curves of the Empty that the eyes follow."""
+    action = bpy.data.objects["Look Here"].animation_data.action
+    return list(module("scene.base.compat").curves_of(action))
 
 
 def tweaks():
@@ -398,7 +456,7 @@ def answer():
     while True:
         path = TALK / f"ask-{_next[0]}.json"
         if not path.exists():
-            return 0.02
+            return 0.005
         given = json.loads(path.read_text(encoding="utf-8"))
         try:
             reply = {"value": globals()[given["name"]](**given["arguments"])}

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from common import JAW, Check, clear, look_at_face, ready_tab, scroll, slider
+from common import JAW, Check, clear, look_at_face, need_section, ready_tab, scroll, slider
 from hand import Hand
 from shot import go_to, key_all
 
@@ -18,6 +18,7 @@ def keyed(hand: Hand, _dna: Path) -> Iterator[Check]:
     clear(hand)
     look_at_face(hand)
     ready_tab(hand)
+    need_section(hand, "RISORIUS_PT_controls")
     hand.ask("run", code=HEAD_IN_HAND)
     key_all(hand)
     yield "Key All with the head in hand: its keys are seen", hand.ask("seen_keys") == [1]
@@ -50,9 +51,7 @@ def _press_i(hand: Hand, frame: int, notches: int) -> None:
     # A drag has no bound here: Blender moves the pointer back while it lasts.
     hand.move(*place)
     hand.do("keydown", "ctrl")
-    for _ in range(notches):
-        hand.do("click", 4)
-        hand.ask("ready")
+    hand.wheel(-notches)
     hand.do("keyup", "ctrl")
     hand.wait("the slider moved", lambda: slider(hand, JAW) != before)
     hand.move(*place)

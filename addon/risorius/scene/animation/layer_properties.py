@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 
 from ... import native
+from ...language import tables
 from ...logic.animation import layer_rules
 
 KINDS = (
@@ -159,6 +160,7 @@ def register() -> None:
     bpy.types.Object.risorius_layer_rules = _still(  # pyright: ignore[reportAttributeAccessIssue]
         bpy.props.BoolProperty,
         name="Exclude Opposites",
+        translation_context=tables.CONTEXT,
         description="Where there are layers, controls that undo each other give way: closed lips "
         "hold the jaw, a blink the wide lids",
         default=True,

@@ -20,8 +20,10 @@ _counts: dict[int, tuple[int, int]] = session.table("shown_keys.counts", ("undo"
 def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
     """Let the animation editors show keys that a face just got.
 
-    The bone of the sliders is selected: it is locked, and no hand moves it by accident. Handles of
-    a face board are selected only where none of those that were keyed is, and so are other bones.
+    The bone of the sliders is selected: it is locked, and no hand moves it by accident. The bones
+    of head and eyes are selected outside of pose mode, where no hand moves them either: whoever
+    moves a column of keys takes theirs along. In pose mode they are selected only where none of the
+    bones that were keyed is, and handles of a face board so in every mode.
 
     Args:
         controls: control armature of the face.
@@ -35,6 +37,8 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
     if parts.FACE in keyed:
         compat.select_bone(bones[parts.FACE])
     handles = {name for name in keyed if parts.BOARD in controls.data.bones[name]}
+    for name in keyed - handles if controls.mode != "POSE" else ():
+        compat.select_bone(bones[name])
     for group in (handles, keyed):
         if not any(compat.is_bone_selected(bones[name]) for name in group):
             for name in group:

@@ -19,6 +19,7 @@ def show_property() -> object:
     """The switch, on the window manager: no part of the file."""
     return bpy.props.BoolProperty(
         name="Show Timing",
+        translation_context=words.CONTEXT,
         description="Milliseconds of each stage of a frame, in the corner of the 3D view",
         options={"SKIP_SAVE"},
         update=_switched,

@@ -20,6 +20,7 @@ from ..blender_types import Context, Icon, UILayout
 from ..common import as_seen
 
 _NAMED = 2  # controls that stand alone, by their names
+_TEXT = 0.72  # of the line; what is left has the button
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) ->
     tweak = tweaks.of(controls)
     if tweak is not None:
         here = tweak.weight(context.scene.frame_current_final) > 0.0
-        said = "Tweak {first:g}-{last:g}" if here else "Tweak {first:g}-{last:g}: not at this frame"
+        said = "Tweak {first:g}-{last:g}" if here else "Not Here: Tweak {first:g}-{last:g}"
         text = words.say(said, first=tweak.first, last=tweak.last)
         trouble = not here or bool(tweak_guard.trouble(controls))
         yield Mode(text, "MOD_TIME", "risorius.tweak", {"enable": False}, trouble)
@@ -98,11 +99,12 @@ def draw(layout: UILayout, context: Context, rig: ArmatureObject, controls: Arma
         context: of it.
         rig, controls: the armatures of the face.
     """
-    row, found = layout.row(align=True), modes(context, rig, controls)
+    found = modes(context, rig, controls)
     if not found:
-        words.show(row, parts.title_of(rig), "USER")
+        words.show(layout.row(align=True), parts.title_of(rig), "USER")
         return
     mode = found[0]
+    row = layout.split(factor=_TEXT, align=True)
     row.alert = mode.alert
     more = words.say("{mode} and {count} more", mode=mode.text, count=len(found) - 1)
     words.show(row, more if found[1:] else mode.text, mode.icon)

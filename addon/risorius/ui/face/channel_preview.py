@@ -13,7 +13,7 @@ from ...scene.character import build, runtime
 from ...scene.frame import channel_preview, evaluate
 from ..blender_types import Context, Item, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_rig
-from ..words import NAMES, say
+from ..words import CONTEXT, NAMES, say
 
 # Blender reads the strings later: they must stay alive.
 _items: list[Item] = session.keep("channel_preview.items", list, ("unregister",))
@@ -107,6 +107,7 @@ def weight_property() -> object:
     """The slider: it shows and sets the override of the active face, and keeps nothing."""
     return bpy.props.FloatProperty(
         name="Weight",
+        translation_context=CONTEXT,
         description="Weight of the shape that is tried",
         soft_min=0.0,
         soft_max=1.0,
