@@ -9,7 +9,7 @@ from pathlib import Path
 from common import JAW, Check, clear, look_at_face, open_section, ready_tab, scroll, slider
 from hand import WIDTH, Hand, difference
 
-HANDLE = "CTRL_C_jaw"
+HANDLE = "face_jaw"
 JOY = r"risorius\.expression\(.*expression=.joy."
 BLEND_JOY = r"risorius\.blend_expression\(.*expression=.joy."
 
@@ -20,14 +20,11 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     look_at_face(hand)
     open_section(hand, "RISORIUS_PT_options", "RISORIUS_PT_board")
     scroll(hand)
-    hand.click(*hand.find(r"risorius\.add_board"))
+    hand.click(*hand.find(r"risorius\.add_board\(.*PRIMARY"))
     hand.wait("a board is there", lambda: HANDLE in hand.ask("bones"))
-    hand.ask("show_all_of_board")
+    hand.wait("pose mode", lambda: hand.ask("state")["mode"] == "POSE")
     before, box = hand.still(), hand.ask("face_box")
     at = hand.ask("bone_at", bone=HANDLE)
-    hand.click(*at)
-    hand.key("ctrl+Tab")
-    hand.wait("pose mode", lambda: hand.ask("state")["mode"] == "POSE")
     hand.click(*at)
     yield "a click selects the handle of the jaw", hand.ask("active_bone") == HANDLE
     hand.move(at[0] + 2, at[1])

@@ -236,17 +236,6 @@ def is_modal():
     return len(window().modal_operators) > 0
 
 
-def show_all_of_board():
-    """The face and its board in the view."""
-    area, _drawing, _sidebar = view()
-    spots = np.array([p for n in bones() for p in [bone_in_world(n)] if n.startswith("CTRL_")])
-    spots = np.concatenate([points(), spots])
-    eye = area.spaces.active.region_3d
-    eye.view_location = (spots.min(axis=0) + spots.max(axis=0)) / 2
-    eye.view_distance = float(max(np.ptp(spots[:, 0]) * 1.3, np.ptp(spots[:, 2]) * 1.9))
-    return True
-
-
 def bone_in_world(name):
     """The middle of a bone of the controls."""
     controls = rig()["risorius_controls"]

@@ -57,7 +57,7 @@ class BoardTable:
         rows: in the file's order; of rows with one control and one output the first that holds
             counts.
         raw_count: R, how many raw controls the face has.
-        is_own: made of the raw controls' names, because the file has no GUI controls.
+        is_own: made of the raw controls' names, with lines through 0, and not the file's.
     """
 
     names: tuple[str, ...]
@@ -140,21 +140,20 @@ class BoardTable:
         return np.clip(self.sums(np.asarray(gui, np.float64)), 0.0, 1.0)
 
     @cached_property
-    def _straight(self) -> tuple[Whole, Whole, NDArray[np.float32]]:
-        """Of an own table, whose lines go through 0: inputs, outputs, slopes."""
+    def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
+        """Of an own table, whose lines go through 0: inputs, outputs, lowest, highest, slopes."""
         rows = self.rows
-        return (
-            np.array([row.gui for row in rows], np.intp),
-            np.array([row.raw for row in rows], np.intp),
-            np.array([row.slope for row in rows], np.float32),
-        )
+        numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
+        low, high, slopes = numbers.reshape(-1, 3).T
+        inputs = np.array([row.gui for row in rows], np.intp)
+        return inputs, np.array([row.raw for row in rows], np.intp), low, high, slopes
 
     def own_raw(self, gui: NDArray[np.float32]) -> NDArray[np.float32]:
         """`raw` of one pose for a table that is_own, at once. Args: gui  float32[G]."""
-        inputs, outputs, slopes = self._straight
-        raw = np.zeros(self.raw_count, np.float32)
-        raw[outputs] = np.clip(gui[inputs] * slopes, 0.0, 1.0)
-        return raw
+        inputs, outputs, low, high, slopes = self._straight
+        given = np.clip(gui[inputs], low, high) * slopes
+        raw = np.bincount(outputs, given, self.raw_count)
+        return np.clip(raw, 0.0, 1.0).astype(np.float32)
 
     def sums(self, gui: Doubles) -> Doubles:
         """float64[N, R] as `raw`, before they are held in 0..1. Args: gui  float64[N, G]."""
