@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -85,7 +86,22 @@ def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[s
     own = np.stack([table.own_raw(row.astype(np.float32)) for row in many])
     assert np.abs(own - table.raw(many)).max() < 1e-6
     found = fitting.fit(table, table.raw(many), np.zeros_like(many))
-    assert np.abs(found - many).max() < 1e-5
+    assert np.abs(table.raw(found) - table.raw(many)).max() < 1e-5
+
+
+def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: Any) -> None:
+    """A brow goes down by its inner or its outer end, while the other end goes up."""
+    names = [f"face_brow_{end}_L.ty" for end in ("inner", "outer")]
+    inner, outer = (table.names.index(name) for name in names)
+    for up, down in ((inner, outer), (outer, inner)):
+        for high, low in ((0.3, -0.8), (0.8, -0.3)):
+            gui = np.zeros((1, len(table.names)))
+            gui[0, [up, down]] = high, low
+            found = fitting.fit(table, table.raw(gui), np.zeros_like(gui))
+            assert found[0, [up, down]] == pytest.approx([high, low], abs=1e-6)
+    frown = np.zeros((1, len(table.names)))
+    frown[0, inner] = -0.7
+    assert np.abs(fitting.fit(table, table.raw(frown), np.zeros_like(frown)) - frown).max() < 1e-6
 
 
 def test_a_face_with_fewer_controls_has_fewer_handles_and_shorter_ways() -> None:
@@ -156,7 +172,7 @@ def test_a_handle_travels_40_pixels_in_a_small_window_beside_the_whole_head(
 
 
 def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None:
-    """The handles that a click on an expression sets, on a head that is 240 mm high or more.
+    """The handles that a click on an expression sets, on a face that is 240 mm high.
 
     Of each mesh that moves, tongue and teeth too: root of the mean square over its vertices that
     the expression moves by 0.1 mm.
@@ -166,14 +182,23 @@ def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None
         _not_run.add("the extension's sample face")
         pytest.skip("extra not run: no extension was built here")
     dna = risorius.load(path)
-    off = primary_errors(dna)
-    within = {name: worst for name, worst in off.items() if worst <= 1.0}
+    off = {name: near.off for name, near in primary_errors(dna).items()}
     assert len(off) == 45
-    assert len(within) >= 42, sorted(off.items(), key=lambda row: -row[1])[:6]
+    worst = sorted(off.items(), key=lambda row: -row[1])[:6]
+    assert sum(value <= 1.0 for value in off.values()) >= 42, worst
 
 
-def primary_errors(dna: Any) -> dict[str, float]:
-    """Expression -> mm that the primary board's nearest pose is off, of the mesh that is most."""
+@dataclass
+class Near:
+    """How far an expression is from rest, and the board's pose from it, in mm; handles used."""
+
+    way: float = 0.0
+    off: float = 0.0
+    handles: int = 0
+
+
+def primary_errors(dna: Any) -> dict[str, Near]:
+    """How near the primary board comes to each expression, on the mesh where that is least."""
     surface = risorius.Surface(dna, risorius.Rig(dna), lod=1)
     table = primary.table_of(list(dna.raw_control_names))
     named = expressions.load()
@@ -182,19 +207,28 @@ def primary_errors(dna: Any) -> dict[str, float]:
     for row, expression in enumerate(named.values()):
         for name, value in expression.weights.items():
             goals[row, index[name.rpartition(".")[2]]] = value
-    start = np.zeros((len(goals), len(table.names)))
-    given = table.raw(fitting.fit(table, goals, start))
-    off = dict.fromkeys(named, 0.0)
+    gui = fitting.fit(table, goals, np.zeros((len(goals), len(table.names))))
+    found = {name: Near() for name in named}
+    for near, values in zip(found.values(), gui, strict=True):
+        used = np.flatnonzero(np.abs(values) > 1e-3)
+        near.handles = len({table.names[g].rpartition(".")[0] for g in used})
     for mesh in surface.mesh_indices:
-
-        def at(raw: Any, mesh: int = mesh) -> Any:
-            return surface.positions(raw.astype(np.float32), mesh).astype(np.float64) * surface.mm
-
-        rest = at(np.zeros(len(index)))
-        for name, goal, raw in zip(named, goals, given, strict=True):
-            wanted = at(goal)
+        rest = _at(surface, np.zeros(len(index)), mesh)
+        for near, goal, raw in zip(found.values(), goals, table.raw(gui), strict=True):
+            wanted = _at(surface, goal, mesh)
             moving = np.linalg.norm(wanted - rest, axis=1) > 0.1
             if moving.any():
-                squares = ((at(raw) - wanted)[moving] ** 2).sum(axis=1)
-                off[name] = max(off[name], float(np.sqrt(squares.mean())))
-    return off
+                near.way = max(near.way, _apart(rest[moving], wanted[moving]))
+                given = _at(surface, raw, mesh)
+                near.off = max(near.off, _apart(given[moving], wanted[moving]))
+    return found
+
+
+def _at(surface: Any, raw: np.ndarray, mesh: int) -> np.ndarray:
+    """Vertices in mm."""
+    places = surface.positions(raw.astype(np.float32), mesh)
+    return np.asarray(places, np.float64) * surface.mm
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.sqrt(((one - other) ** 2).sum(axis=1).mean()))

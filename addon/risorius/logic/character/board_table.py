@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -96,6 +97,13 @@ class BoardTable:
         out = np.zeros(self.raw_count, bool)
         out[[row.raw for row in self.rows]] = True
         return out
+
+    @cached_property
+    def sharing(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of GUI controls that lead to one raw control, but not to the same ones only."""
+        led = [set(self.outputs_of(gui)) for gui in range(len(self.names))]
+        pairs = combinations(range(len(led)), 2)
+        return tuple((a, b) for a, b in pairs if led[a] & led[b] and led[a] != led[b])
 
     def outputs_of(self, gui: int) -> list[int]:
         """The raw controls that a GUI control leads to. Args: gui  its index."""

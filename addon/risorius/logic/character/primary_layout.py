@@ -21,7 +21,7 @@ _MARGIN = 0.1  # around all
 _SMOOTH = 6  # pieces between two corners of an outline
 # One half of the face, from the forehead down to the chin.
 _FACE = (
-    (0.0, 6.52), (1.6, 6.5), (3.1, 6.25), (4.25, 5.4), (4.8, 4.0), (4.8, 1.6), (4.72, -1.0),
+    (0.0, 6.52), (1.6, 6.5), (3.35, 6.28), (4.45, 5.5), (4.82, 4.0), (4.8, 1.6), (4.72, -1.0),
     (4.55, -3.4), (4.15, -5.0), (3.3, -6.3), (2.2, -6.95), (0.0, -7.0),
 )  # fmt: skip
 # The middle of the tongue, half its width, its root, where its tip begins and how far that goes.
