@@ -29,7 +29,7 @@ MODES = {
 @pytest.fixture
 def rig(dna_file):
     rig = scene.load(dna_file)
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     bpy.ops.risorius.lead(by="SLIDERS")
     bpy.context.scene.frame_set(2)
     bpy.context.scene.frame_end = 3

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 import risorius
+from mathutils import Vector
 from support import scene
 from support.faces import small_face
 
@@ -53,7 +54,7 @@ def board_file(tmp_path_factory):
 def rig(board_file):
     """The face with its board, which leads."""
     rig = scene.load(board_file)
-    assert bpy.ops.risorius.add_board() == {"FINISHED"}
+    scene.add_board()
     return rig
 
 
@@ -200,7 +201,7 @@ def test_switching_keeps_the_pose_and_says_what_is_lost(board_file):
     scene.set_controls(rig, jawOpen=0.4, mouthCornerPullL=0.6, eyeLookUpL=0.5, eyeLookDownL=0.3)
     assert "risorius_lead" not in scene.controls(rig)
     assert len(scene.controls(rig).pose.bones) == 6  # nothing before one asks for it
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     # Up and down at once is one handle: the greater stays.
     expected = {"jawOpen": 0.4, "mouthCornerPullL": 0.6, "eyeLookUpL": 0.5}
     assert shown(rig) == expected
@@ -228,7 +229,7 @@ def test_keys_go_over_to_the_board_and_back(board_file):
         bpy.context.scene.frame_set(frame)
         before[frame] = scene.snapshot(rig)
     action = scene.controls(rig).animation_data.action
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     assert lead(rig) == "SLIDERS"  # its keys would stand still else
     for by in ("BOARD", "SLIDERS"):
         assert bpy.ops.risorius.lead(by=by) == {"FINISHED"}
@@ -358,7 +359,7 @@ def test_renamed_handles_get_their_names_back_and_deleted_ones_come_back(rig, bo
     bpy.ops.object.mode_set(mode="OBJECT")
     bpy.context.view_layer.update()
     assert error(rig, board_file, CTRL_C_jaw__ty=0.75) < SAME
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     assert error(rig, board_file, CTRL_C_jaw__ty=0.75) < SAME
     put(rig, **{PULL_L: (0.0, 0.5)})
     assert error(rig, board_file, CTRL_C_jaw__ty=0.75, CTRL_L_mouth_pull__ty=0.5) < SAME
@@ -382,7 +383,7 @@ def test_without_any_handle_the_sliders_lead(rig, board_file):
 def test_removing_leaves_nothing_but_the_pose(board_file):
     rig = scene.load(board_file)
     before = scene.counts()
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     put(rig, **{JAW: (0.0, 0.75)})
     assert bpy.ops.risorius.remove_board() == {"FINISHED"}
     assert scene.counts() == before
@@ -417,7 +418,7 @@ def test_a_file_without_gui_controls_gets_a_board_of_our_own(tmp_path):
     dna.gui_control_names, dna.gui_to_raw = [], risorius.Conditionals()
     dna.save(str(path))
     rig = scene.load(path)
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     put(rig, CTRL_jawOpen=(0.0, 0.4), CTRL_eyeLookL=(-0.3, 0.2), CTRL_mouthCornerPullR=(0.0, 1.0))
     raw = np.zeros(11)
     raw[[0, 2, 5, 6]] = 0.4, 1.0, 0.3, 0.2
@@ -454,3 +455,130 @@ def test_what_is_baked_plays_whoever_led(rig, kind):
         for frame, wanted in frames.items():
             bpy.context.scene.frame_set(frame)
             assert np.abs(scene.snapshot(rig) - wanted).max() < 1e-6 * np.ptp(wanted)
+
+
+CORNER_L, CORNER_R = "face_mouth_corner_L", "face_mouth_corner_R"
+
+
+@pytest.fixture
+def primary(board_file):
+    rig = scene.load(board_file)
+    scene.add_board("PRIMARY")
+    return rig
+
+
+def test_a_primary_board_moves_the_face_by_its_own_handles(primary, board_file):
+    names = {bone.name for bone in scene.controls(primary).pose.bones}
+    assert {"face_jaw", "face_gaze", CORNER_L, CORNER_R, "face_brow_inner_L"} <= names
+    assert "face_tongue" not in names  # this face has no tongue
+    assert not names & {JAW, LOOK}
+    put(primary, face_jaw=(0.0, -0.5), face_gaze=(0.4, -0.2), **{CORNER_L: (0.7, 0.3)})
+    raw = np.zeros(11)
+    raw[[0, 1, 4, 7]] = 0.5, 0.3, 0.4, 0.2  # jaw, left corner, look left, look down
+    assert scene.error_against_oracle(primary, board_file, raw) < SAME
+    scene.face(primary)["twice"] = 0.7  # no handle leads to it
+    raw[9] = 0.7
+    scene.update(scene.controls(primary))
+    assert scene.error_against_oracle(primary, board_file, raw) < SAME
+
+
+def test_handles_of_both_sides_lie_and_go_alike(primary):
+    names = (CORNER_L, CORNER_R, "face_gaze")
+    rest = [np.array(handle(primary, name).matrix.translation) for name in names]
+    put(primary, **{CORNER_L: (0.0, 0.5), CORNER_R: (0.0, 0.5)})
+    left, right = (np.array(handle(primary, name).matrix.translation) for name in names[:2])
+    assert rest[0][0] - rest[2][0] == pytest.approx(rest[2][0] - rest[1][0], rel=1e-3)
+    assert rest[0][0] > rest[2][0]  # the character's left is the viewer's right
+    assert left[2] - rest[0][2] == pytest.approx(right[2] - rest[1][2], rel=1e-3)
+    assert left[2] > rest[0][2]
+
+
+def test_one_kind_of_board_takes_the_place_of_the_other_with_pose_and_keys(board_file):
+    rig = scene.load(board_file)
+    scene.add_board("COMPLETE")
+    _key_jaw(rig)
+    put(rig, **{PULL_L: (0.0, 0.4), LOOK: (0.0, 0.0)})
+    bpy.context.scene.frame_set(5)
+    kept = scene.controls(rig).animation_data.action
+    for kind, own, other in (("PRIMARY", "face_jaw", JAW), ("COMPLETE", JAW, "face_jaw")):
+        before = len(bpy.data.actions)
+        scene.add_board(kind)
+        bones = scene.controls(rig).pose.bones
+        assert own in bones
+        assert other not in bones
+        assert lead(rig) == "BOARD"
+        assert shown(rig) == {"jawOpen": 1.0, "mouthCornerPullL": 0.4}
+        assert {c.data_path for c in scene.curves(scene.controls(rig))} == {
+            f'pose.bones["{own}"].location'
+        }
+        bpy.context.scene.frame_set(9)
+        assert shown(rig)["jawOpen"] == pytest.approx(0.125, abs=1e-3)  # as ROWS bend it
+        bpy.context.scene.frame_set(5)
+        assert len(bpy.data.actions) == before + 1  # what was played before is kept
+    assert kept.use_fake_user
+    bpy.ops.risorius.add_board()  # without a kind: that which is there
+    assert JAW in scene.controls(rig).pose.bones
+
+
+def test_a_primary_board_survives_a_new_file_and_leaves_nothing_when_it_goes(primary, tmp_path):
+    put(primary, face_jaw=(0.0, -0.75))
+    dna, path = board_face(), tmp_path / "new.dna"
+    dna.raw_control_names = ["CTRL_expressions.jawLeft", *dna.raw_control_names[1:]]
+    dna.save(str(path))
+    bpy.ops.risorius.replace_dna(filepath=str(path))
+    assert handle(primary, "face_jaw").lock_location[:] == (False, True, True)
+    assert lead(primary) == "BOARD"
+    bpy.ops.risorius.remove_board()
+    assert "risorius_board_kind" not in scene.controls(primary)
+    assert len(scene.controls(primary).pose.bones) == 6
+
+
+def test_a_face_of_unknown_names_gets_the_complete_board(tmp_path):
+    dna, path = board_face(), tmp_path / "other.dna"
+    dna.raw_control_names = [f"blob{i}" for i in range(len(dna.raw_control_names))]
+    dna.save(str(path))
+    rig = scene.load(path)
+    assert bpy.ops.risorius.add_board(kind="PRIMARY") == {"FINISHED"}
+    assert JAW in scene.controls(rig).pose.bones
+
+
+@pytest.mark.parametrize("perspective", ["PERSP", "ORTHO"])
+def test_a_new_board_lies_beside_the_face_in_the_view_and_in_the_hand(board_file, perspective):
+    rig = scene.load(board_file)
+    area = next(a for a in bpy.context.window.screen.areas if a.type == "VIEW_3D")
+    view, lens = area.spaces.active.region_3d, area.spaces.active.lens
+    view.view_perspective = perspective
+    assert bpy.ops.risorius.add_board(kind="PRIMARY") == {"FINISHED"}
+    controls = scene.controls(rig)
+    assert (bpy.context.mode, bpy.context.object) == ("POSE", controls)
+    assert bpy.context.selected_objects == [controls]
+    turn = view.view_rotation.to_matrix().inverted()
+    assert (turn @ Vector((0.0, -1.0, 0.0))).z == pytest.approx(1.0, abs=1e-5)  # from the front
+    regions = {region.type: region for region in area.regions}
+    window, tools = regions["WINDOW"], regions["TOOLS"]
+    fit = scene.submodule("logic.character.view_fit")
+
+    def pixels(points):
+        places = [turn @ (point - view.view_location) for point in points]
+        size = window.width, window.height
+        seen = fit.on_screen(places, view.view_distance, lens, size, perspective == "PERSP")
+        return seen + np.array(size) / 2
+
+    corners = [
+        item.matrix_world @ Vector(corner)
+        for item in scene.meshes(rig).values()
+        if "head" in item.name.lower()
+        for corner in item.bound_box
+    ]
+    bone = controls.pose.bones["board"]
+    outline = [bone.matrix @ v.co for v in bone.custom_shape.data.vertices]
+    head, board = pixels(corners), pixels(outline)
+    assert head[:, 0].max() < board[:, 0].min()
+    both = np.concatenate([head, board])
+    assert both.min(axis=0)[0] >= tools.width
+    assert both.min(axis=0)[1] >= 0.0
+    assert both.max(axis=0)[0] <= window.width
+    assert both.max(axis=0)[1] <= regions["TOOL_HEADER"].y - window.y
+    filled = np.ptp(both, axis=0) / (window.width - tools.width, window.height - 26 * 2)
+    assert filled.max() > 0.9
+    bpy.ops.object.mode_set(mode="OBJECT")

@@ -251,7 +251,7 @@ def test_keys_of_handles_lie_on_what_moves_them(man, board):
     rig, _corner = man
     one, _other = two_handles(rig)
     if board:
-        bpy.ops.risorius.add_board()
+        scene.add_board()
     bpy.ops.risorius.select_handle(mesh=one[0], vertex=one[1])
     bpy.context.scene.frame_set(7)
     assert bpy.ops.risorius.key_handles() == {"FINISHED"}

@@ -49,7 +49,7 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
 
 def test_appended_outlines_are_not_left_in_the_scene(rig, tmp_path):
     name, path = scene.controls(rig).name, tmp_path / "face.blend"
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.wm.append(directory=f"{path}/Object", filename=rig_name(path))

@@ -93,7 +93,7 @@ def test_a_key_of_blenders_own_is_seen_and_an_edit_of_keys_selects_nothing(rig):
 
 def test_keys_of_handles_are_seen_and_those_of_sliders_when_the_board_has_gone(rig):
     bpy.ops.risorius.key()
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     assert bpy.ops.risorius.lead(by="BOARD") == {"FINISHED"}
     _select(rig)
     bpy.ops.risorius.key()

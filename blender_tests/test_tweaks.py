@@ -169,7 +169,7 @@ def test_of_a_face_without_keys_and_of_its_board(dna_file):
     assert below(rig) == []
     assert [shown(rig, f, LEFT) for f in (20, 5)] == pytest.approx([0.4, 0.0], abs=1e-5)
     bpy.ops.risorius.tweak(enable=False)
-    bpy.ops.risorius.add_board()
+    scene.add_board()
     bpy.ops.risorius.lead(by="BOARD")
     assert bpy.ops.risorius.tweak(first=10, last=30, fade=0) == {"FINISHED"}
     assert not bpy.ops.risorius.lead.poll()

@@ -27,6 +27,12 @@ def load(path, mode="AUTO", **options):
     return next(o for o in bpy.data.objects if o not in before and "risorius_controls" in o)
 
 
+def add_board(kind="COMPLETE"):
+    """Give the active face a board; the mode is object mode then."""
+    assert bpy.ops.risorius.add_board(kind=kind) == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
 def controls(rig):
     """The control armature."""
     return rig["risorius_controls"]

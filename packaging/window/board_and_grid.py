@@ -21,7 +21,7 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     look_at_face(hand)
     open_section(hand, "RISORIUS_PT_options", "RISORIUS_PT_board")
     scroll(hand)
-    hand.click(*hand.find(r"risorius\.add_board"))
+    hand.click(*hand.find(r"risorius\.add_board\(.*PRIMARY"))
     handles = hand.wait("a board is there", lambda: hand.see(HANDLES))
     hand.still()
     told = f"{len(handles)} handles and the face are in the view, in pose mode"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Thirty poses, each by sliders, by the face board and by dragging the skin: what a hand does.
+"""Thirty poses, each by sliders, by both face boards and by dragging the skin: what a hand does.
 
     python tests/bench/posing_tasks.py man.dna
 
@@ -11,12 +11,14 @@ once, as the tab of the sliders is opened once: neither is counted. Regions of s
 the beginning of a pose and opened by a click; the last lines have it with all of them open already,
 as they are for one who has just used them. Pixels are those that
 the pointer travels, on the layouts of the add-on: sliders of 75 or 150 pixels in rows of 22 below
-headings that are opened by a click, a board 285 pixels high, a head of 1.25 pixels a millimetre.
-A slider or handle is set to the pixel. A drag is one of the add-on's: few sliders, on the screen
-(both axes, depth free), or, with a key held, one slider alone, symmetric where the pose is.
-Dragging ends when a tenth of the way is left, at as many drags as sliders are needed, or when no
-drag brings a twentieth of what is left. Error: root of the mean square over vertices that the pose
-moves by 0.1 mm, in mm; *way* is what it is at rest.
+headings that are opened by a click, a head of 1.25 pixels a millimetre, a complete board 285 pixels
+high, a primary board of 41 pixels a unit, as it is framed in a window of 1366 x 768. On a board the
+hand brings each handle to where the add-on brings it for that pose. A slider or handle is set to a
+pixel. A drag is one of the add-on's: few sliders, on the screen (both axes, depth free), or, with a
+key held, one slider alone, symmetric where the pose is. Dragging ends when a tenth of the way is
+left, at as many drags as sliders are needed, or when no drag brings a twentieth of what is left.
+Error: root of the mean square over vertices that the pose moves by 0.1 mm, in mm; *way* is what it
+is at rest. The last number is how many sliders are away from rest then, left and right as one.
 """
 
 from __future__ import annotations
@@ -40,9 +42,12 @@ import test_addon_logic  # noqa: F401  registers the package of the logic
 board_table = importlib.import_module("risorius_addon_logic.character.board_table")
 board_fit = importlib.import_module("risorius_addon_logic.character.board_fit")
 board_layout = importlib.import_module("risorius_addon_logic.character.board_layout")
+primary_layout = importlib.import_module("risorius_addon_logic.character.primary_layout")
+primary_table = importlib.import_module("risorius_addon_logic.character.primary_table")
 
 HEADING, ROW, WIDTH = 24, 22, 150.0  # pixels
 BOARD_HEIGHT, PIXELS_A_MM = 285.0, 1.25
+PRIMARY_UNIT, PRIMARY_AWAY = 41.0, 340.0  # from the face to the middle of the primary board
 AWAY = 420.0  # from the face to the sidebar
 ENOUGH, WORTH, CANDIDATES = 0.1, 0.05, 10
 TASKS: dict[str, dict[str, float]] = {
@@ -137,6 +142,11 @@ class Face:
         """Where a place is on the screen, from the middle of the face."""
         return tuple(self.screen @ (place - self.middle) * self.mm * PIXELS_A_MM)
 
+    def pairs(self, raw):
+        """How many sliders are away from rest, left and right as one."""
+        away = np.flatnonzero(np.abs(raw) > 1e-3)
+        return len({min(int(c), int(self.partners[c])) for c in away})
+
     def raw_of(self, task):
         """float64[R] of a pose; a name without a side is both."""
         out = np.zeros(len(self.names))
@@ -188,13 +198,32 @@ def by_sliders(face, goal):
     return done, raw
 
 
-def by_board(face, goal):
-    """Each handle that the pose needs, both ways of one in one drag."""
+def by_complete(face, goal):
+    """The complete board."""
     table = face.table
     ways = board_layout.ways_of(table, list(face.dna.raw_control_names), {})
     handles = board_layout.handles_of(table, ways, regions.region_of)
     board = board_layout.lay_out(handles, regions.TITLES)
-    unit = BOARD_HEIGHT / board.height
+    return by_board(table, board, BOARD_HEIGHT / board.height, 250.0, goal)
+
+
+def by_primary(face, goal):
+    """The primary board."""
+    table = primary_table.table_of(list(face.dna.raw_control_names))
+    board = primary_layout.lay_out(table, primary_table.handles_of(table, {}))
+    return by_board(table, board, PRIMARY_UNIT, PRIMARY_AWAY, goal)
+
+
+def by_board(table, board, unit, away, goal):
+    """Each handle that the pose needs, both ways of one in one drag.
+
+    Args:
+        table: its GUI controls.
+        board: where its handles lie.
+        unit: pixels of one of its units.
+        away: pixels from the face to its middle.
+        goal: float64[R].
+    """
     gui = board_fit.fit(table, goal[None], np.zeros((1, len(table.names))))[0]
     done, used = Done(), np.zeros_like(gui)
     for handle in board.handles:
@@ -203,9 +232,9 @@ def by_board(face, goal):
             if axis is not None and abs(gui[axis.gui]) > 1e-3:
                 pixels = round(gui[axis.gui] / axis.unit * unit)
                 way[number] = float(pixels)
-                used[axis.gui] = np.clip(pixels / unit * axis.unit, axis.low, axis.high)
+                used[axis.gui] = np.clip(pixels / unit, axis.low, axis.high) * axis.unit
         if any(way):
-            x, y = handle.place[0] * unit + 250.0, handle.place[1] * unit
+            x, y = handle.place[0] * unit + away, handle.place[1] * unit
             done.drag((x, y), (x + way[0], y + way[1]))
     return done, np.asarray(table.raw(used[None]))[0]
 
@@ -296,28 +325,30 @@ def main():
     parser.add_argument("face", type=Path)
     args = parser.parse_args()
     face = Face(risorius.load(args.face))
-    print("| pose | way mm | sliders: events, px, mm | board | drags |\n|---|---|---|---|---|")
+    print("| pose | way mm | sliders: events, px, mm, sliders | complete | primary | drags |")
+    print("|---|---|---|---|---|---|")
     events, openings, keys, ways = [], [], [], []
     for title, task in TASKS.items():
         goal = face.raw_of(task)
         wanted = face.at(goal)
         moving = np.linalg.norm(wanted - face.rest, axis=1) * face.mm > 0.1
-        rows = [by_sliders(face, goal), by_board(face, goal)]
+        rows = [by_sliders(face, goal), by_complete(face, goal), by_primary(face, goal)]
         rows.append(by_drags(face, goal, moving, int((goal != 0).sum())))
         cells = []
         for done, raw in rows:
             done.error = apart(face, face.at(raw), wanted, moving)
             behind = f" + {done.keys}" if done.keys else ""
-            cells.append(f"{done.events}{behind}, {done.pixels:,.0f}, {done.error:.2f}")
-        events.append([(d.events, d.pixels, d.error) for d, _ in rows])
+            count = face.pairs(raw)
+            cells.append(f"{done.events}{behind}, {done.pixels:,.0f}, {done.error:.2f}, {count}")
+        events.append([(d.events, d.pixels, d.error, face.pairs(raw)) for d, raw in rows])
         openings.append(rows[0][0].openings)
-        keys.append(rows[2][0].keys)
+        keys.append(rows[3][0].keys)
         way = apart(face, face.rest, wanted, moving)
         ways.append(way)
         print(f"| {title} | {way:.2f} | {' | '.join(cells)} |", flush=True)
     table = np.array(events)
     middles = np.median(table, axis=0)
-    middle = [f"{row[0]:.0f}, {row[1]:,.0f}, {row[2]:.2f}" for row in middles]
+    middle = [f"{row[0]:.0f}, {row[1]:,.0f}, {row[2]:.2f}, {row[3]:.0f}" for row in middles]
     print(f"| **median** | | {' | '.join(middle)} |")
     tell(table, np.array(openings), np.array(keys), np.array(ways))
 
@@ -326,12 +357,12 @@ def tell(table, openings, keys, ways):
     """What drags take of what sliders take: medians.
 
     Args:
-        table: [pose, way of doing it, events and pixels and mm].
+        table: [pose, way of doing it, events and pixels and mm and sliders].
         openings: events of each pose that opened regions.
         keys: events of keys of each pose's drags.
         ways: mm that each pose is away from rest.
     """
-    sliders, _board, drags = table[:, 0], table[:, 1], table[:, 2]
+    sliders, drags = table[:, 0], table[:, 3]
     near = drags[:, 2] <= 0.2 * ways
     events = drags[:, 0] / sliders[:, 0]
     for words, share in (

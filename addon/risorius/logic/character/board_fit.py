@@ -48,6 +48,19 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
     """
     wanted = np.asarray(raw, np.float64)
     gui = np.clip(np.asarray(start, np.float64), table.lowest, table.highest)
+    _descend(table, wanted, gui)
+    rows = np.flatnonzero(_cost(table, wanted, gui) > _RIGHT) if table.sharing else ()
+    if len(rows):
+        part = gui[rows]
+        for pair in table.sharing:
+            _make_room(table, wanted[rows], part, pair)
+        _descend(table, wanted[rows], part)
+        gui[rows] = part
+    return gui
+
+
+def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
+    """Bring each control in turn to its best value until none moves. Args: gui  is changed."""
     totals = table.sums(gui)
     movable = [g for g in range(len(table.names)) if table.outputs_of(g)]
     for _sweep in range(_SWEEPS):
@@ -65,7 +78,28 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
             totals[:, outputs] = others + table.part(index, best)
         if moved < _ENOUGH:
             break
-    return gui
+
+
+def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int, int]) -> None:
+    """One of two that lead to the same may have taken what only the other could leave: let the
+    two begin again, each as the first. Args: gui  is changed where that is better."""
+    left = _cost(table, wanted, gui)
+    for order in (pair, pair[::-1]):
+        tried = gui.copy()
+        tried[:, order] = 0.0
+        for index in order:
+            outputs = table.outputs_of(index)
+            others = table.sums(tried)[:, outputs] - table.part(index, tried[:, index])
+            tried[:, index] = _best(table, index, wanted[:, outputs], others)
+        cost = _cost(table, wanted, tried)
+        better = cost < left - _RIGHT
+        gui[better], left[better] = tried[better], cost[better]
+
+
+def _cost(table: BoardTable, wanted: Doubles, gui: Doubles) -> Doubles:
+    """float64[N]: the sum of squares that is left of what the table leads to."""
+    off = (table.raw(gui) - wanted)[:, table.reached]
+    return np.asarray((off**2).sum(axis=1), np.float64)
 
 
 def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Doubles:

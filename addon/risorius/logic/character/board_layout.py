@@ -369,7 +369,7 @@ def _label(stem: str, region: str) -> list[str]:
 
 def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
     """Sliders in rows with a label below. Args: rows  from the top down, from left to right."""
-    boxes = [[_frame(h) for h in row] for row in rows]
+    boxes = [[frame_of(h) for h in row] for row in rows]
     widths = [sum(f[2] - f[0] for f in row) + _GAP * (len(row) - 1) for row in boxes]
     heights = [max(f[3] - f[1] for f in row) for row in boxes]
     text = max(board_letters.width(line, _TEXT) for line in label)
@@ -385,8 +385,8 @@ def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
     return cell
 
 
-def _frame(handle: Handle) -> tuple[float, float, float, float]:
-    """Left, bottom, right, top of a slider's frame, from where its handle rests."""
+def frame_of(handle: Handle) -> tuple[float, float, float, float]:
+    """Left, bottom, right, top of a slider's frame, from where it rests. Args: handle  of it."""
     left, bottom, right, top = handle.box()
     half = _TRACK / 2
     return left - half, bottom - half, right + half, top + half
@@ -520,16 +520,16 @@ def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Li
     for handle, across, down in cell.inside:
         place = (x + across, y + down)
         handles.append(replace(handle, place=place))
-        lines += [_moved(line, (-place[0], -place[1])) for line in _track(handle)]
+        lines += [_moved(line, (-place[0], -place[1])) for line in track_of(handle)]
     bottom = y - cell.height
     for number, text in enumerate(reversed(cell.label)):
         start = x + (cell.width - board_letters.width(text, _TEXT)) / 2
         lines += board_letters.lines(text, start, bottom + number * 1.4 * _TEXT, _TEXT)
 
 
-def _track(handle: Handle) -> list[Line]:
-    """A slider's frame, with marks where it rests."""
-    left, bottom, right, top = _frame(handle)
+def track_of(handle: Handle) -> list[Line]:
+    """A slider's frame, with marks where it rests. Args: handle  it, with its rest at 0, 0."""
+    left, bottom, right, top = frame_of(handle)
     frame = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
     if handle.x is not None and handle.y is not None:
         return [frame, [(left, 0.0), (right, 0.0)], [(0.0, bottom), (0.0, top)]]

@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,7 +58,7 @@ class BoardTable:
         rows: in the file's order; of rows with one control and one output the first that holds
             counts.
         raw_count: R, how many raw controls the face has.
-        is_own: made of the raw controls' names, because the file has no GUI controls.
+        is_own: made of the raw controls' names, with lines through 0, and not the file's.
     """
 
     names: tuple[str, ...]
@@ -96,6 +97,13 @@ class BoardTable:
         out = np.zeros(self.raw_count, bool)
         out[[row.raw for row in self.rows]] = True
         return out
+
+    @cached_property
+    def sharing(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of GUI controls that lead to one raw control, but not to the same ones only."""
+        led = [set(self.outputs_of(gui)) for gui in range(len(self.names))]
+        pairs = combinations(range(len(led)), 2)
+        return tuple((a, b) for a, b in pairs if led[a] & led[b] and led[a] != led[b])
 
     def outputs_of(self, gui: int) -> list[int]:
         """The raw controls that a GUI control leads to. Args: gui  its index."""
@@ -140,21 +148,20 @@ class BoardTable:
         return np.clip(self.sums(np.asarray(gui, np.float64)), 0.0, 1.0)
 
     @cached_property
-    def _straight(self) -> tuple[Whole, Whole, NDArray[np.float32]]:
-        """Of an own table, whose lines go through 0: inputs, outputs, slopes."""
+    def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
+        """Of an own table, whose lines go through 0: inputs, outputs, lowest, highest, slopes."""
         rows = self.rows
-        return (
-            np.array([row.gui for row in rows], np.intp),
-            np.array([row.raw for row in rows], np.intp),
-            np.array([row.slope for row in rows], np.float32),
-        )
+        numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
+        low, high, slopes = numbers.reshape(-1, 3).T
+        inputs = np.array([row.gui for row in rows], np.intp)
+        return inputs, np.array([row.raw for row in rows], np.intp), low, high, slopes
 
     def own_raw(self, gui: NDArray[np.float32]) -> NDArray[np.float32]:
         """`raw` of one pose for a table that is_own, at once. Args: gui  float32[G]."""
-        inputs, outputs, slopes = self._straight
-        raw = np.zeros(self.raw_count, np.float32)
-        raw[outputs] = np.clip(gui[inputs] * slopes, 0.0, 1.0)
-        return raw
+        inputs, outputs, low, high, slopes = self._straight
+        given = np.clip(gui[inputs], low, high) * slopes
+        raw = np.bincount(outputs, given, self.raw_count)
+        return np.clip(raw, 0.0, 1.0).astype(np.float32)
 
     def sums(self, gui: Doubles) -> Doubles:
         """float64[N, R] as `raw`, before they are held in 0..1. Args: gui  float64[N, G]."""

@@ -16,7 +16,7 @@ from ...logic.base import names
 from ...logic.base.sentences import Sentence, told
 from ...logic.character import board_fit
 from ..base import compat, parts
-from ..base.blender_types import ArmatureObject
+from ..base.blender_types import ArmatureObject, Context
 from ..character import armatures, board, board_bones, runtime, shown_keys
 from . import actions, clip_actions
 
@@ -91,6 +91,34 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
     for other in compat.played_actions(controls):
         if any(True for _curve in _leading_curves(other, controls, live, not by_board)):
             done.idle.append(other.name)
+    return done
+
+
+def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
+    """Put the other kind of board in the place of one, in its pose; keys go over as at a switch.
+
+    Args:
+        context: with a view layer.
+        rig: a character with a face board, whose control armature is of this file.
+        kind: runtime.PRIMARY or runtime.COMPLETE.
+
+    Returns:
+        Converted, of the new board.
+    """
+    controls, done = parts.controls_there(rig), Converted()
+    led = board.leads_face(rig)
+    if led:
+        done = switch(rig, by_board=False, with_keys=True)
+    board_bones.remove(context, rig)
+    board.set_kind(controls, kind)
+    board_bones.add(context, rig)
+    if not led:
+        board_bones.show(controls, False)
+        return done
+    before, done = done, switch(rig, by_board=True, with_keys=True)
+    if done.kept is not None and before.kept is not None:  # of the way over the sliders
+        bpy.data.actions.remove(done.kept)
+        done.kept = before.kept
     return done
 
 

@@ -49,6 +49,7 @@ FACE = "face"  # the bone of the control armature that bears the controls
 PART = "risorius_part"  # on the control armature's bones: what each is, whatever its name
 OUTLINES = "risorius_outlines"  # on the control armature: sizes of its hidden outlines, by PART
 BOARD = "risorius_board"  # on the bones of the face board: the name of each
+BOARD_KIND = "risorius_board_kind"  # on the control armature: "PRIMARY" for that board
 LEAD = "risorius_lead"  # on the control armature: "BOARD" where the face board moves the face
 PULL = "risorius_pull"  # on the deforming armature: its driver keeps the controls evaluated
 PINS = "risorius_pins"  # on the control armature: mesh and vertex of each pin of a drag, flat

@@ -108,6 +108,26 @@ def join_pose_mode(context: Context, item: ArmatureObject) -> None:
     layer.objects.active = active
 
 
+def enter_pose_mode(context: Context, item: ArmatureObject) -> None:
+    """Make an armature the active object, alone selected and in pose mode.
+
+    Args:
+        context: a Blender context, in whose view layer the armature is visible.
+        item: the armature.
+    """
+    layer = context.view_layer
+    active = layer.objects.active
+    if active is not None and active != item and active.mode != "OBJECT":
+        with context.temp_override(active_object=active, object=active):
+            bpy.ops.object.mode_set(mode="OBJECT")
+    for other in layer.objects:
+        other.select_set(other == item, view_layer=layer)
+    layer.objects.active = item
+    if item.mode != "POSE":
+        with context.temp_override(active_object=item, object=item):
+            bpy.ops.object.mode_set(mode="POSE")
+
+
 def build_rig(
     context: Context,
     plan: plans.CharacterPlan,

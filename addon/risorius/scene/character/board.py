@@ -118,6 +118,19 @@ def set_lead(controls: ArmatureObject, by_board: bool) -> None:
     controls.update_tag()
 
 
+def set_kind(controls: ArmatureObject, kind: str) -> None:
+    """Say which kind of board a face has, before its bones are built.
+
+    Args:
+        controls: its control armature, without a board.
+        kind: runtime.PRIMARY, else runtime.COMPLETE.
+    """
+    if kind == runtime.PRIMARY:
+        controls[parts.BOARD_KIND] = kind
+    elif parts.BOARD_KIND in controls:
+        del controls[parts.BOARD_KIND]
+
+
 def read(seen: ArmatureObject, live: runtime.Runtime) -> Floats:
     """The GUI controls that the handles ask for, within their ranges.
 

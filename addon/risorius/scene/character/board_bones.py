@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.base.space import world_matrices
-from ...logic.character import board_layout
+from ...logic.character import board_layout, primary_layout, primary_table
 from ...logic.character.board_layout import Board, Handle
 from ..base import parts
-from ..base.blender_types import ArmatureObject, Context
-from . import armatures, board, bone_shapes, runtime
+from ..base.blender_types import ArmatureObject, Context, MeshObject
+from . import armatures, board, bone_shapes, lods, runtime
 
 COLLECTION = "Face Board"
 BORDER, FRAMES = runtime.BOARD_BONES
@@ -52,18 +52,15 @@ def add(context: Context, rig: ArmatureObject) -> int:
         How many handles were made.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
-    regions = native.regions()
-    ways = board_layout.ways_of(live.table, live.labels, _sideways(live))
-    taken = (*runtime.CONTROL_BONES, *runtime.BOARD_BONES)
-    planned = board_layout.handles_of(live.table, ways, regions.of_slider, taken)
-    layout = board_layout.lay_out(planned, regions.titles, live.table.is_own)
+    layout = _layout(live)
     new = [handle for handle in layout.handles if handle.bone not in controls.data.bones]
     bars = [name for name in runtime.BOARD_BONES if name not in controls.data.bones]
     if not new and not bars:
         return 0
     if controls.data.users > 1:
         controls.data = controls.data.copy()
-    place = _beside(rig, live, layout)
+    primary = live.board == runtime.PRIMARY
+    place = _near(rig, live, layout) if primary else _beside(rig, live, layout)
     with (
         armatures.kept_selection(context),
         armatures.edit_armature(context, controls.data) as edit_bones,
@@ -72,9 +69,22 @@ def add(context: Context, rig: ArmatureObject) -> int:
     context.view_layer.update()
     _dress(controls, layout, [*bars, *(handle.bone for handle in new)], place.unit)
     _show_bones(controls, [*bars, *(handle.bone for handle in new)])
+    if primary:
+        bone_shapes.step_aside(controls, aside=True)
     armatures.pull_more(rig, controls)
     context.view_layer.update()
     return len(new)
+
+
+def _layout(live: runtime.Runtime) -> Board:
+    taken = (*runtime.CONTROL_BONES, *runtime.BOARD_BONES)
+    table, sideways = live.table, _sideways(live)
+    if live.board == runtime.PRIMARY:
+        return primary_layout.lay_out(table, primary_table.handles_of(table, sideways, taken))
+    regions = native.regions()
+    ways = board_layout.ways_of(table, live.labels, sideways)
+    planned = board_layout.handles_of(table, ways, regions.of_slider, taken)
+    return board_layout.lay_out(planned, regions.titles, table.is_own)
 
 
 def remove(context: Context, rig: ArmatureObject) -> int:
@@ -106,8 +116,19 @@ def remove(context: Context, rig: ArmatureObject) -> int:
     meshes = [shape.data for shape in unused]
     bpy.data.batch_remove(unused)
     bpy.data.batch_remove([mesh for mesh in meshes if mesh is not None and not mesh.users])
+    bone_shapes.step_aside(controls, aside=False)
+    board.set_kind(controls, runtime.COMPLETE)
     context.view_layer.update()
     return len(there)
+
+
+def corners(controls: ArmatureObject) -> NDArray[np.float64]:
+    """float64[N, 3] in the world: the outline of a face board. Args: controls  that have it."""
+    bone = controls.pose.bones[BORDER]
+    drawn = bone.custom_shape.data if bone.custom_shape is not None else None
+    points = [v.co for v in drawn.vertices] if isinstance(drawn, bpy.types.Mesh) else [Vector()]
+    matrix = controls.matrix_world @ bone.matrix
+    return np.array([matrix @ point for point in points], np.float64)
 
 
 def show(controls: ArmatureObject, visible: bool) -> None:
@@ -162,15 +183,30 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
     return world_matrices(space.rotations(angles), space.points(places), parents)[:, :3, 3]
 
 
-def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """Where the board goes: beside the head, as high as that."""
-    corners = [live.rest[:, :3, 3].min(axis=0), live.rest[:, :3, 3].max(axis=0)]
-    for item in parts.meshes_of(rig):
+def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
+    """Where a primary board goes."""
+    middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
+    return _Place(Vector(middle), unit)
+
+
+def _box(
+    items: Sequence[MeshObject], live: runtime.Runtime, joints: bool = False
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The least and the greatest places of meshes; of the joints too, if asked or without any."""
+    corners: list[NDArray[Any]] = []
+    for item in items:
         points = np.empty(3 * len(item.data.vertices), np.float32)
         item.data.vertices.foreach_get("co", points)
         if len(points):
             corners += [points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)]
-    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    if joints or not corners:
+        corners += [live.rest[:, :3, 3].min(axis=0), live.rest[:, :3, 3].max(axis=0)]
+    return np.min(corners, axis=0), np.max(corners, axis=0)
+
+
+def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
+    """Where a complete board goes: beside the head, as high as that."""
+    low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())
     unit = size * _SHARE / layout.height
     middle = (low + high) / 2

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 import bpy
 from mathutils import Vector
 
+from ..base import parts
+from ..base.blender_types import ArmatureObject
+
 Line = Sequence[tuple[float, float]]  # corners in the xy plane, the last joined to the first
 _COUNT = 32
 
@@ -150,6 +153,23 @@ def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
     if name != "face":  # around the upright bone, or across one that looks ahead
         bone.custom_shape_rotation_euler = (math.pi / 2, 0.0, 0.0)
     colour(bone, _COLOURS[name])
+
+
+def step_aside(controls: ArmatureObject, aside: bool) -> None:
+    """Draw the outline of the sliders' bone on the other side of the head, out of a board's way.
+
+    Args:
+        controls: control armature of a face.
+        aside: there, else at the bone; an outline that the user has moved stays.
+    """
+    bone, head = controls.pose.bones[parts.FACE], controls.data.bones.get("head")
+    if head is None:
+        return
+    across = Vector((2.0 * (head.head_local.x - bone.bone.head_local.x), 0.0, 0.0))
+    there = bone.bone.matrix_local.to_3x3().inverted() @ across
+    before, after = (Vector(), there) if aside else (there, Vector())
+    if (bone.custom_shape_translation - before).length < 1e-3 * bone.bone.length:
+        bone.custom_shape_translation = after
 
 
 def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:

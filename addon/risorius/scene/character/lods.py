@@ -28,6 +28,15 @@ def shows(item: MeshObject, level: int) -> bool:
     return parts.LODS not in item or level in levels_of(item)
 
 
+def heads(rig: ArmatureObject) -> list[MeshObject]:
+    """The head of the finest level that is built, else all meshes of that. Args: rig  of them."""
+    items = parts.meshes_of(rig)
+    first = min((min(levels_of(item), default=0) for item in items), default=0)
+    shown = [item for item in items if shows(item, first)]
+    found = [item for item in shown if "head" in item.data.name.rpartition("_lod")[0].lower()]
+    return found or shown
+
+
 def viewport_level(rig: ArmatureObject) -> int:
     """The level that the viewport shows."""
     return saved.whole(rig, parts.LOD, 0, 0, _COARSEST)

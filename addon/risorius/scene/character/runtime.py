@@ -7,7 +7,7 @@ Holds no Blender object: it is found anew, or rebuilt, after load, undo, append 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,13 +18,14 @@ from ... import native
 from ...logic.base import names
 from ...logic.base.sentences import told
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
-from ...logic.character import board_layout, board_table, plans
+from ...logic.character import board_layout, board_table, plans, primary_table
 from ..base import console, parts, saved, session, storage, written
 from ..base.blender_types import ArmatureObject, MeshObject
 
 # The bones of the control armature beside those of a face board.
 CONTROL_BONES = (parts.FACE, "neck", "head", "eyes", "eye_L", "eye_R")
 BOARD_BONES = ("board", "board_frames")  # by which a board is taken, and what is drawn on it
+COMPLETE, PRIMARY = "COMPLETE", "PRIMARY"  # the two kinds of board
 DEFAULT_EYE_ANGLE = float(np.radians(30.0))
 
 
@@ -46,6 +47,7 @@ class Runtime:
         morphs: mesh index -> risorius.Morph.
         surfaces: level of detail -> risorius.Surface.
         chains: joint -> Chain.
+        board: the kind of face board that `table` and `handles` are of: PRIMARY or COMPLETE.
     """
 
     dna: native.Dna
@@ -63,6 +65,7 @@ class Runtime:
     morphs: dict[int, native.Morph] = field(default_factory=dict)
     surfaces: dict[int, native.Surface] = field(default_factory=dict)
     chains: dict[int, Chain] = field(default_factory=dict)
+    board: str = COMPLETE
 
     def chain(self, joint: int) -> Chain:
         """The joints from the root to one, read when first asked for."""
@@ -85,8 +88,19 @@ class Runtime:
         return self.surfaces[lod]
 
     @cached_property
+    def _with_primary(self) -> Runtime:
+        return replace(self, board=PRIMARY)
+
+    def with_board(self, kind: str) -> Runtime:
+        """The same compiled data with a kind of face board. Args: kind  PRIMARY or COMPLETE."""
+        assert self.board == COMPLETE or kind == PRIMARY
+        return self._with_primary if kind != self.board else self
+
+    @cached_property
     def table(self) -> board_table.BoardTable:
-        """The GUI controls: the file's, else made of its raw controls."""
+        """The GUI controls: the primary board's, the file's, or made of its raw controls."""
+        if self.board == PRIMARY:
+            return primary_table.table_of(self.labels)
         if not self.dna.gui_control_names:
             return board_table.of_raw_controls(self.labels, self.lowest)
         rows = self.dna.gui_to_raw
@@ -96,10 +110,13 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The sliders of the face board, which lie nowhere yet."""
+        """The sliders of the face board; those of a complete one lie nowhere yet."""
+        taken = (*CONTROL_BONES, *BOARD_BONES)
+        if self.board == PRIMARY:
+            return primary_table.handles_of(self.table, {}, taken)
         ways = [board_layout.UP] * len(self.table.names)
         region_of = native.regions().of_slider
-        return board_layout.handles_of(self.table, ways, region_of, (*CONTROL_BONES, *BOARD_BONES))
+        return board_layout.handles_of(self.table, ways, region_of, taken)
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
         """The native conversion of poses for bones that stand for these joints."""
@@ -164,11 +181,12 @@ _cache: dict[tuple[str, float], Runtime | None] = session.table("runtime.cache",
 _LEAST_UNIT, _MOST_UNIT = 1e-9, 1e9  # metres per Blender unit that a scene can have
 
 
-def of(rig: ArmatureObject) -> Runtime | None:
+def of(rig: ArmatureObject, board: str | None = None) -> Runtime | None:
     """The Runtime of a character.
 
     Args:
         rig: its deforming armature.
+        board: the kind of face board; None for that which the character has.
 
     Returns:
         Runtime, or None where the armature has lost its DNA.
@@ -186,12 +204,17 @@ def of(rig: ArmatureObject) -> Runtime | None:
             words = names.printable(str(error)).rstrip(".")
             console.say(f"the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None
-    return _cache[key]
+    live = _cache[key]
+    if board is None:
+        controls = saved.item(rig, parts.CONTROLS)
+        is_primary = controls is not None and controls.get(parts.BOARD_KIND) == PRIMARY
+        board = PRIMARY if is_primary else COMPLETE
+    return live.with_board(board) if live is not None else None
 
 
-def there(rig: ArmatureObject) -> Runtime:
-    """The Runtime of a character that has its DNA: whoever asks has looked."""
-    live = of(rig)
+def there(rig: ArmatureObject, board: str | None = None) -> Runtime:
+    """`of` a character that has its DNA: whoever asks has looked. Args: rig, board  as there."""
+    live = of(rig, board)
     assert live is not None
     return live
 

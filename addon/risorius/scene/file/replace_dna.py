@@ -60,7 +60,7 @@ def replace_file(
         fresh, warnings = build.import_file(
             context, path, _options(rig, levels, unit), lambda share: progress(share * 0.7)
         )
-        after = runtime.there(fresh)
+        after = runtime.there(fresh).with_board(before.board)
         now = tuple(lods.built(fresh))
         new = plans.plan_character(after.dna, rig.name, now, unit, after.rests)
         change = Change(rig, before, after, old, new, report=list(warnings))
@@ -289,6 +289,7 @@ def _renew_board(
         return
     controls = parts.controls_there(change.rig)
     board_bones.remove(context, change.rig)
+    board.set_kind(controls, change.before.board)
     if board_bones.add(context, change.rig):
         board.put_places(controls, change.after, places)
         board.set_lead(controls, led)

@@ -10,18 +10,31 @@ import bpy
 from ... import native
 from ...logic.base import names
 from ...scene.animation import board_keys, tweaks
+from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import board, board_bones, runtime, shown_keys
+from ...scene.character import armatures, board, board_bones, runtime, shown_keys
 from ...scene.frame import evaluate
 from ...scene.live import sessions
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, active_controls, face_controls, face_rig
+from ..file import framing
 from ..hand.base import HandOperator
 from ..words import say
 
 LEADERS = (
     ("SLIDERS", "Sliders", "The sliders of the panel move the face"),
     ("BOARD", "Board", "The face board moves the face; the sliders show what it gives"),
+)
+
+
+KINDS = (
+    (
+        "PRIMARY",
+        "Primary",
+        "Some 30 handles that lie as a face does: brows, lids, gaze, nose, cheeks, mouth, jaw, "
+        "tongue. What none leads to stays with its slider",
+    ),
+    ("COMPLETE", "Complete", "A handle for each control that the file gives its own board"),
 )
 
 
@@ -78,19 +91,53 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
     bl_idname = "risorius.add_board"
     bl_label = "Add Face Board"
 
+    kind: bpy.props.EnumProperty(
+        name="Board",
+        description="Which board; where there is the other one, this takes its place in its pose",
+        items=KINDS,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def description(
+        cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
+    ) -> str:
+        """The tooltip. Args: context  of the button, properties  as it gives them."""
+        tips = {kind: tip for kind, _name, tip in KINDS}
+        text = tips.get(getattr(properties, "kind", ""), "")
+        return bpy.app.translations.pgettext_tip(text) or text
+
     def execute(self, context: Context) -> Result:
         rig, controls = face_rig(context), face_controls(context)
         live = runtime.there(rig)
-        if not live.handles:
+        old = live.board if board.is_there(controls, live) else None
+        kind = self.kind if self.properties.is_property_set("kind") or old is None else old
+        if kind == runtime.PRIMARY and not runtime.there(rig, kind).handles:
+            kind = runtime.COMPLETE
+            self.report({"INFO"}, say("No control has a name of the primary board's: complete."))
+        if kind == runtime.COMPLETE and not runtime.there(rig, kind).handles:
             self.report({"ERROR"}, say("This file has no control that a board could move."))
             return {"CANCELLED"}
-        new = not board.is_there(controls, live)
-        count = board_bones.add(context, rig)
-        if new:
+        if old is not None and old != kind:
+            count = self._exchange(context, rig, kind)
+        else:
+            board.set_kind(controls, kind)
+            count = board_bones.add(context, rig)
+        if old is None:
             self._lead(rig)
         evaluate.bring_up(context, rig)
+        if old != kind:
+            _take_up(context, rig)
         self.report({"INFO"}, say("{count} sliders on the face board", count=count))
         return {"FINISHED"}
+
+    def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:
+        """Put the other kind of board in the place of one, in its pose and with its keys."""
+        done = board_keys.exchange(context, rig, kind)
+        lost = board_keys.lost(done.loss)
+        if lost is not None:
+            self.report({"WARNING"}, say(lost))
+        return len(board.handles_in(rig))
 
     def _lead(self, rig: ArmatureObject) -> None:
         """Let a new board lead, unless keys of sliders would stand still by that."""
@@ -103,6 +150,15 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         lost = board_keys.lost(board_keys.switch(rig, by_board=True, with_keys=False).loss)
         if lost is not None:
             self.report({"WARNING"}, say(lost))
+
+
+def _take_up(context: Context, rig: ArmatureObject) -> None:
+    """Show a new board beside the head, its handles ready for the hand: in pose mode."""
+    controls = parts.controls_there(rig)
+    if not controls.visible_get() or controls.hide_select:
+        return
+    armatures.enter_pose_mode(context, controls)
+    framing.show_with_board(context, rig)
 
 
 class RISORIUS_OT_remove_board(_OwnArmature, Operator):

@@ -29,6 +29,21 @@ def draw_lead(layout: UILayout, controls: ArmatureObject, live: runtime.Runtime)
     return led
 
 
+def draw_kinds(layout: UILayout, kind: str | None) -> None:
+    """Buttons that add a board, or put the other kind in its place.
+
+    Args:
+        layout: of the panel or menu.
+        kind: that of the board which is there; None where there is none.
+    """
+    if kind is None:
+        button = layout.operator("risorius.add_board", icon="ADD")
+        button.kind = runtime.PRIMARY
+    for other, text in ((runtime.PRIMARY, "Primary Board"), (runtime.COMPLETE, "Complete Board")):
+        if other != (kind or runtime.PRIMARY):
+            layout.operator("risorius.add_board", text=text, icon="MESH_GRID").kind = other
+
+
 class RISORIUS_PT_board(FaceOnlyPanel, Panel):
     bl_idname = "RISORIUS_PT_board"
     bl_label = "Face Board"
@@ -41,19 +56,21 @@ class RISORIUS_PT_board(FaceOnlyPanel, Panel):
         if live is None:
             return
         if not board.is_there(controls, live):
-            layout.operator("risorius.add_board", icon="ADD")
+            draw_kinds(layout, None)
             return
         led = draw_lead(layout, controls, live)
         gone = board.missing(controls, live)
         if gone:
             words.write(layout, words.say("{count} of its sliders are gone.", count=len(gone)))
-            layout.operator("risorius.add_board", text="Bring Back", icon="LOOP_BACK")
+            back = layout.operator("risorius.add_board", text="Bring Back", icon="LOOP_BACK")
+            back.kind = live.board
         if led:
             row = layout.row(align=True)
             button = row.operator("risorius.reset_board", text="Reset Selected", icon="LOOP_BACK")
             button.selected = True
             row.operator("risorius.reset_board", text="Reset All").selected = False
         layout.operator_menu_enum("risorius.select_board", "region", icon="RESTRICT_SELECT_OFF")
+        draw_kinds(layout, live.board)
         layout.operator("risorius.remove_board", icon="TRASH")
 
 

@@ -7,15 +7,17 @@ from typing import cast
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
+from numpy.typing import NDArray
 
 from ...logic.character import view_fit
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import lods
+from ...scene.character import board_bones, lods
 from ..blender_types import Context
 
 _FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks
 _THREE_QUARTER = Vector((0.36, -0.92, 0.16))  # whence a face is seen best
+_ROWS, _COLUMNS = ("HEADER", "TOOL_HEADER"), ("TOOLS", "UI")  # regions that lie over a view
 _SIDE = 0.77  # cosine of 40 degrees: whoever looks from farther aside sees a profile
 
 
@@ -77,6 +79,64 @@ def show_whole(context: Context, rig: ArmatureObject) -> int:
     return shown
 
 
+def show_with_board(context: Context, rig: ArmatureObject) -> None:
+    """Let the 3D views of the window show head and face board beside each other, from the front.
+
+    What sidebar, toolbar and headers cover is left free. A view through a camera leaves the camera;
+    one that is locked to an object or the 3D cursor stays.
+
+    Args:
+        context: a Blender context; without a window nothing happens.
+        rig: deforming armature of the face, with a board.
+    """
+    screen = context.window.screen if context.window is not None else None
+    controls = parts.controls_there(rig)
+    turn = (controls.matrix_world.to_quaternion() @ _FRONT).to_track_quat("Z", "Y")
+    corners = np.concatenate([_corners(rig), board_bones.corners(controls)])
+    points = corners @ np.array(turn.to_matrix(), np.float64)
+    depth = float(points[-1, 2])  # of the board: there the view turns
+    for area in screen.areas if screen is not None else ():
+        region = _window_of(area) if area.type == "VIEW_3D" else None
+        if region is None or _is_locked(_view(area)):
+            continue
+        space, size = _view(area), (region.width, region.height)
+        for view in (space.region_3d, *space.region_quadviews)[:1]:
+            if view is None:
+                continue
+            if view.view_perspective == "CAMERA":
+                view.view_perspective = "PERSP"
+            perspective = view.view_perspective == "PERSP"
+            right, up, far = view_fit.fit(
+                points - (0.0, 0.0, depth), space.lens, size, _free_part(area, region), perspective
+            )
+            view.view_rotation = turn
+            view.view_location = turn @ Vector((right, up, depth))
+            view.view_distance = far
+
+
+def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
+    """The part of a region that no other of its area covers, in pixels from its own corner.
+
+    Sidebar, toolbar and headers cover it where the preferences let regions overlap.
+    """
+    left, bottom, right, top = 0, 0, region.width, region.height
+    for other in area.regions:
+        if min(other.width, other.height) <= 1 or other.type not in (*_ROWS, *_COLUMNS):
+            continue
+        x, y = other.x - region.x, other.y - region.y
+        at_start = x < region.width / 2 if other.type in _COLUMNS else y < region.height / 2
+        if other.type in _COLUMNS and at_start:
+            left = max(left, x + other.width)
+        elif other.type in _COLUMNS:
+            right = min(right, x)
+        elif at_start:
+            bottom = max(bottom, y + other.height)
+        else:
+            top = min(top, y)
+    whole = (0, 0, region.width, region.height)
+    return (left, bottom, right, top) if left < right and bottom < top else whole
+
+
 def _window_of(area: bpy.types.Area) -> bpy.types.Region | None:
     return next((r for r in area.regions if r.type == "WINDOW"), None)
 
@@ -114,14 +174,14 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
             view.view_rotation = (turn @ _THREE_QUARTER).to_track_quat("Z", "Y")
 
 
+def _corners(rig: ArmatureObject) -> NDArray[np.float64]:
+    """float64[N, 3] in the world: the corners of what holds the head."""
+    boxes = [(item.matrix_world, item.bound_box) for item in lods.heads(rig)]
+    return np.array([matrix @ Vector(c) for matrix, box in boxes for c in box], np.float64)
+
+
 def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
     """Middle and radius of the head, else of all meshes of the finest level that is built."""
-    items = parts.meshes_of(rig)
-    first = min((min(lods.levels_of(item), default=0) for item in items), default=0)
-    shown = [item for item in items if lods.shows(item, first)]
-    heads = [item for item in shown if "head" in item.data.name.rpartition("_lod")[0].lower()]
-    corners = np.array(
-        [item.matrix_world @ Vector(c) for item in heads or shown for c in item.bound_box]
-    )
+    corners = _corners(rig)
     low, high = corners.min(axis=0), corners.max(axis=0)
     return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2

@@ -77,9 +77,10 @@ class RISORIUS_MT_face_board(Menu):
     def draw(self, context: Context) -> None:
         layout, controls = self.layout, active_controls(context)
         live = runtime.of(face_rig(context)) if controls is not None else None
-        there = controls is not None and live is not None and board.is_there(controls, live)
-        if not there:
-            layout.operator("risorius.add_board", icon="ADD")
+        if controls is None or live is None or not board.is_there(controls, live):
+            layout.operator("risorius.add_board", icon="ADD").kind = runtime.PRIMARY
+            button = layout.operator("risorius.add_board", text="Complete Board", icon="MESH_GRID")
+            button.kind = runtime.COMPLETE
             return
         layout.operator_menu_enum("risorius.lead", "by")
         layout.operator_menu_enum("risorius.select_board", "region", icon="RESTRICT_SELECT_OFF")

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is drawn of the primary board: a face, with the frames of its handles and their labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import board_layout, board_letters, primary_table
+from .board_layout import DOWN, LEFT, RIGHT, UP, Board, Direction, Handle, Line
+from .board_table import BoardTable
+
+_TEXT, _LINE = 0.26, 0.36  # heights of letters and of lines
+_GAP, _DISC = 0.12, 0.32  # from a frame to its label, and from where a handle rests
+# So that both fill a view beside each other: a unit of the board, and the way to it.
+_UNIT, _AWAY = 0.122, 0.07  # over the height of the head
+_MARGIN = 0.1  # around all
+_SMOOTH = 6  # pieces between two corners of an outline
+# One half of the face, from the forehead down to the chin.
+_FACE = (
+    (0.0, 6.52), (1.6, 6.5), (3.35, 6.28), (4.45, 5.5), (4.82, 4.0), (4.8, 1.6), (4.72, -1.0),
+    (4.55, -3.4), (4.15, -5.0), (3.3, -6.3), (2.2, -6.95), (0.0, -7.0),
+)  # fmt: skip
+# The middle of the tongue, half its width, its root, where its tip begins and how far that goes.
+_TONGUE = (6.0, 1.05, 2.95, -5.2, 0.7)
+
+
+def lay_out(table: BoardTable, handles: Sequence[Handle]) -> Board:
+    """Draw the board around its handles.
+
+    Args:
+        table: from primary_table.table_of.
+        handles: from primary_table.handles_of.
+
+    Returns:
+        Board, whose middle is at 0, 0.
+    """
+    lines = [*_outlines()]
+    parts = primary_table.sides_of(table)
+    for handle, (part, side) in zip(handles, parts, strict=True):
+        x, y = handle.place
+        lines += [[(x + a, y + b) for a, b in line] for line in board_layout.track_of(handle)]
+        at = (-part.label_at[0], part.label_at[1]) if side == "R" else part.label_at
+        lines += _label(handle, [_words(text, side) for text in part.label], at)
+    return _centred(handles, lines)
+
+
+def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], float]:
+    """Where the board goes: close to the head, as far in front as the face.
+
+    Args:
+        low, high: float[3] of what the head takes; the face looks along -y.
+        width: of the board.
+
+    Returns:
+        Its middle, and the length of one of its units.
+    """
+    low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
+    tall = float(high[2] - low[2]) or 1.0
+    x = float(high[0]) + tall * (_AWAY + _UNIT * width / 2)
+    return [x, float(low[1]), float(low[2] + high[2]) / 2], tall * _UNIT
+
+
+def _words(text: str, side: str) -> str:
+    """Both ends of a label as they lie on a side."""
+    ends = text.split(" | ")
+    return "   ".join(reversed(ends) if side == "R" else ends)
+
+
+def _label(handle: Handle, rows: Sequence[str], at: Direction) -> Iterator[Line]:
+    """The words of a handle beside, above or below its frame."""
+    left, bottom, right, top = board_layout.frame_of(handle)
+    left, bottom = min(left, _GAP - _DISC), min(bottom, _GAP - _DISC)
+    right, top = max(right, _DISC - _GAP), max(top, _DISC - _GAP)
+    x, y = handle.place
+    high = _TEXT + _LINE * (len(rows) - 1)
+    first = {
+        UP: y + top + _GAP + high - _TEXT,
+        DOWN: y + bottom - _GAP - _TEXT,
+    }.get(at, y + (top + bottom + high) / 2 - _TEXT)
+    for number, text in enumerate(rows):
+        wide = board_letters.width(text, _TEXT)
+        start = {RIGHT: x + right + _GAP, LEFT: x + left - _GAP - wide}.get(
+            at, x + (left + right - wide) / 2
+        )
+        yield from board_letters.lines(text, start, first - number * _LINE, _TEXT)
+
+
+def _outlines() -> Iterator[Line]:
+    half = _smooth(_FACE)
+    yield [*half, *((-x, y) for x, y in half[-2::-1])]
+    middle, wide, root, low, bend = _TONGUE
+    turns = np.linspace(np.pi, 2 * np.pi, 4 * _SMOOTH + 1)
+    tip = [(middle + wide * float(np.cos(t)), low + bend * float(np.sin(t))) for t in turns]
+    yield [(middle - wide, root), *tip, (middle + wide, root)]
+
+
+def _smooth(corners: Sequence[tuple[float, float]]) -> Line:
+    """A curve through corners (Catmull and Rom's)."""
+    points = np.array([corners[0], *corners, corners[-1]])
+    out = [corners[0]]
+    for a, b, c, d in zip(points, points[1:], points[2:], points[3:], strict=False):
+        for t in np.arange(1, _SMOOTH + 1) / _SMOOTH:
+            place = 0.5 * (
+                2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2
+                + (3 * b - a - 3 * c + d) * t**3
+            )  # fmt: skip
+            out.append((float(place[0]), float(place[1])))
+    return out
+
+
+def _centred(handles: Sequence[Handle], lines: Sequence[Line]) -> Board:
+    points = np.array([point for line in lines for point in line])
+    low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+    x, y = ((low + high) / 2).tolist()
+    width, height = (high - low).tolist()
+    right, top = width / 2, height / 2
+    corners = [(-right, top), (right, top), (right, -top), (-right, -top), (-right, top)]
+    return Board(
+        tuple(replace(h, place=(h.place[0] - x, h.place[1] - y)) for h in handles),
+        tuple([(a - x, b - y) for a, b in line] for line in lines),
+        (corners,),
+        width,
+        height,
+    )

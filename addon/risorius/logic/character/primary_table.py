@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The primary board: some 30 handles that lie as a face does, each for several controls.
+
+A handle's place along its own axes is a value from -1 to 1; each half of an axis leads to controls
+with weights. So it is a table of GUI controls like that of a file, made of the names of the raw
+controls. A control that a face lacks is left out, and so is a half, an axis or a handle that would
+lead to none. What no handle leads to stays with the sliders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ..base import names
+from . import slider_words
+from .board_layout import DOWN, LEFT, RIGHT, UP, Axis, Direction, Handle
+from .board_letters import Point
+from .board_table import BoardTable, Row
+
+Led = Mapping[str, float]  # raw controls without prefix and side, and what of a value each gets
+_CLEAR = 0.05  # a movement to one side that is less tells nothing
+
+
+@dataclass(frozen=True)
+class Part:
+    """A handle of the face, or both of a pair.
+
+    Attributes:
+        stem: its name without the side.
+        label: its words on the board, in short lines; `inwards | outwards` names both ends.
+        region: of the face.
+        place: where it rests on the board; of a pair the one on the character's left.
+        paired: each side has its own; else it leads to both sides of a control.
+        up, down, out, inward: what the halves of its axes lead to; where it is one for both sides
+            `out` is the character's left.
+        label_at: the side of it that the label stands on; of a pair that of the character's left.
+    """
+
+    stem: str
+    label: tuple[str, ...]
+    region: str
+    place: Point
+    paired: bool
+    up: Led = field(default_factory=dict)
+    down: Led = field(default_factory=dict)
+    out: Led = field(default_factory=dict)
+    inward: Led = field(default_factory=dict)
+    label_at: Direction = DOWN
+
+
+PARTS = (
+    Part("brow_inner", ("Brow", "Inner"), "brow", (1.75, 5.2), True,
+         up={"browRaiseIn": 1.0}, down={"browDown": 1.0}, inward={"browLateral": 1.0},
+         label_at=RIGHT),
+    # The face has one control that lowers a brow; here it goes beside the inner end raised.
+    Part("brow_outer", ("Brow Outer",), "brow", (3.35, 5.2), True,
+         up={"browRaiseOuter": 1.0}, down={"browDown": 1.0}),
+    Part("gaze", ("Gaze",), "eye", (0.0, 2.75), False,
+         up={"eyeLookUp": 1.0}, down={"eyeLookDown": 1.0},
+         out={"eyeLookLeft": 1.0}, inward={"eyeLookRight": 1.0}),
+    Part("lid_upper", ("Upper Lid",), "eye", (1.9, 2.75), True,
+         up={"eyeWiden": 1.0}, down={"eyeBlink": 1.0}),
+    Part("lid_lower", ("Lower Lid",), "eye", (3.2, 2.3), True,
+         up={"eyeSquintInner": 1.0}, down={"eyeLowerLidDown": 1.0}),
+    Part("nose", ("Nose",), "nose", (1.25, -0.05), True, up={"noseWrinkle": 1.0},
+         out={"noseNostrilDilate": 1.0}, inward={"noseNostrilCompress": 1.0}),
+    Part("cheek", ("Cheek",), "cheek", (4.2, 0.0), True, up={"eyeCheekRaise": 1.0}),
+    Part("puff", ("Dimple | Puff",), "cheek", (3.4, -1.15), True,
+         out={"mouthCheekBlow": 1.0, "mouthLipsBlow": 0.4}, inward={"mouthDimple": 1.0}),
+    Part("mouth", ("Mouth",), "mouth", (0.0, -1.2), False,
+         out={"mouthLeft": 1.0}, inward={"mouthRight": 1.0}),
+    Part("mouth_corner", ("Corner",), "mouth", (3.2, -3.2), True,
+         up={"mouthCornerPull": 1.0}, down={"mouthCornerDepress": 1.0},
+         out={"mouthStretch": 1.0}, inward={"mouthCornerNarrow": 1.0}),
+    Part("lip_upper", ("Upper", "Lip"), "mouth", (1.6, -2.7), True,
+         up={"mouthUpperLipRaise": 1.0}, label_at=UP),
+    Part("lip_lower", ("Lower", "Lip"), "mouth", (1.6, -4.22), True,
+         up={"mouthLowerLipBite": 1.0}, down={"mouthLowerLipDepress": 1.0}),
+    Part("lips", ("Lips",), "mouth", (0.0, -3.2), False,
+         up={"mouthFunnelU": 1.0, "mouthFunnelD": 1.0},
+         down={"mouthPressU": 1.0, "mouthPressD": 1.0, "mouthLipsPress": 0.4},
+         out={"mouthLipsPurseU": 1.0, "mouthLipsPurseD": 1.0},
+         inward={"mouthUpperLipRollIn": 1.0, "mouthLowerLipRollIn": 1.0}),
+    Part("jaw", ("Jaw",), "jaw", (0.0, -5.05), False,
+         down={"jawOpen": 1.0}, out={"jawLeft": 1.0}, inward={"jawRight": 1.0}),
+    Part("jaw_forward", ("Jaw", "Fwd"), "jaw", (-2.5, -5.72), False,
+         up={"jawFwd": 1.0}, down={"jawBack": 1.0}, label_at=LEFT),
+    Part("chin", ("Chin",), "jaw", (2.5, -5.72), False,
+         up={"jawChinRaiseD": 1.0, "jawChinRaiseU": 0.4}, down={"jawOpenExtreme": 1.0},
+         label_at=RIGHT),
+    Part("tongue", ("Tongue",), "tongue", (6.0, -1.25), False,
+         up={"tongueUp": 1.0}, down={"tongueDown": 1.0},
+         out={"tongueLeft": 1.0}, inward={"tongueRight": 1.0}),
+    Part("tongue_out", ("Tongue Out",), "tongue", (6.0, -4.1), False,
+         up={"tongueIn": 1.0}, down={"tongueOut": 1.0},
+         out={"tongueWide": 1.0}, inward={"tongueNarrow": 1.0}),
+    Part("tongue_tip", ("Tip",), "tongue", (5.4, 1.7), False,
+         up={"tongueTipUp": 1.0}, down={"tongueTipDown": 1.0}),
+    Part("tongue_bend", ("Bend",), "tongue", (6.25, 1.7), False,
+         up={"tongueBendUp": 1.0}, down={"tongueBendDown": 1.0}),
+    Part("neck_tension", ("Neck",), "neck", (-4.1, -6.25), False, up={"neckStretch": 1.0}),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Way:
+    """An axis of a handle: its name as a GUI control's, and the weights of its two halves."""
+
+    name: str
+    rises: dict[int, float]
+    falls: dict[int, float]
+
+
+def bone_of(part: Part, side: str) -> str:
+    """The bone of a handle. Args: part  which it is; side  "L" or "R", "" for one of no side."""
+    return f"face_{part.stem}_{side}" if side else f"face_{part.stem}"
+
+
+def table_of(labels: Sequence[str]) -> BoardTable:
+    """The table of a face.
+
+    Args:
+        labels: the names of its raw controls.
+
+    Returns:
+        BoardTable, whose GUI controls are called by the bones: `face_mouth_corner_L.ty`.
+    """
+    index = {slider_words.short_name(label): i for i, label in enumerate(labels)}
+    found: list[str] = []
+    rows: list[Row] = []
+    for part in PARTS:
+        for side in "LR" if part.paired else ("",):
+            for way in _ways_of(part, side, index):
+                here = len(found)
+                found.append(way.name)
+                rows += [Row(here, raw, 0.0, 1.0, share, 0.0) for raw, share in way.rises.items()]
+                rows += [Row(here, raw, -1.0, 0.0, -share, 0.0) for raw, share in way.falls.items()]
+    return BoardTable(tuple(found), tuple(rows), len(labels), is_own=True)
+
+
+def _ways_of(part: Part, side: str, index: Mapping[str, int]) -> Iterator[_Way]:
+    for axis, rise, fall in (("tx", part.out, part.inward), ("ty", part.up, part.down)):
+        rises, falls = _raws(rise, side, index), _raws(fall, side, index)
+        if rises or falls:
+            yield _Way(f"{bone_of(part, side)}.{axis}", rises, falls)
+
+
+def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
+    """Indices of the controls that a half leads to, with their weights."""
+    out = {}
+    for stem, share in led.items():
+        wanted = (stem + side,) if side else (stem, f"{stem}L", f"{stem}R")
+        out |= {index[name]: share for name in wanted if name in index}
+    return out
+
+
+def handles_of(
+    table: BoardTable, sideways: Mapping[int, float], taken: Iterable[str] = ()
+) -> list[Handle]:
+    """The handles of a table, each where it lies on the board.
+
+    Args:
+        table: from table_of.
+        sideways: of some GUI controls how far the face goes to its own left, as measured.
+        taken: names that no bone must get.
+    """
+    index = {name: gui for gui, name in enumerate(table.names)}
+    found = []
+    for part, side in sides_of(table):
+        bone, (x, y) = bone_of(part, side), part.place
+        across, upright = index.get(f"{bone}.tx"), index.get(f"{bone}.ty")
+        goes = RIGHT if side != "R" else LEFT
+        if across is not None and not side and sideways.get(across, 0.0) < -_CLEAR:
+            goes = LEFT
+        ways = [
+            Axis(gui, float(table.lowest[gui]), float(table.highest[gui]), 1.0, way)
+            if gui is not None
+            else None
+            for gui, way in ((across, goes), (upright, UP))
+        ]
+        place = (-x if side == "R" else x, y)
+        found.append(Handle(bone, side, part.region, part.stem, ways[0], ways[1], place))
+    labels = names.unique_labels([handle.bone for handle in found], taken)
+    return [replace(h, bone=label) for h, label in zip(found, labels, strict=True)]
+
+
+def sides_of(table: BoardTable) -> Iterator[tuple[Part, str]]:
+    """The parts that a table has handles of, with the side of each. Args: table  from table_of."""
+    there = {name.rpartition(".")[0] for name in table.names}
+    for part in PARTS:
+        for side in "LR" if part.paired else ("",):
+            if bone_of(part, side) in there:
+                yield part, side
