@@ -13,6 +13,9 @@ places: dict[int, object] = {}  # deforming armature -> bytes of the matrix that
 weights: dict[int, object] = {}  # shape key -> bytes of the channel weights of its sum
 # Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
 bone_writers: dict[int, object] = {}
+# Deforming armature -> the Reading of frame/joint_readings.py, until the file is edited. Kept by
+# `forget`: it knows what the console was told.
+readings: dict[int, object] = {}
 unheard: set[int] = set()  # shape keys whose points were last written without an update
 _refused: set[int] = set()  # objects of overrides that Blender lets nobody write to
 

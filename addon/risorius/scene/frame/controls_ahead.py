@@ -88,14 +88,21 @@ class _Stage:
         self._data.__exit__(None, None, None)
 
 
+def is_edited() -> bool:
+    """Whether the file may have been edited since the last frame.
+
+    Without an interface scripts edit and step without an update between.
+    """
+    return _state["edited"] or bpy.app.background
+
+
 def is_needed() -> bool:
     """Whether anything sees a frame before its faces could be brought up after it.
 
     Else the curves would be evaluated twice for nothing. The first frame after an edit is always
     done: what was edited may read a face.
     """
-    # Without an interface scripts edit and step without an update between.
-    if _state["edited"] or bpy.app.background:
+    if is_edited():
         _state["simulated"] = caches.any_simulates()
     if _state["edited"] or _state["simulated"]:
         return True
