@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 import risorius
-from mathutils import Euler, Matrix, Quaternion
+from mathutils import Euler, Matrix, Quaternion, Vector
 from support import oracle, scene
 from support.faces import HEAD, NECK_POSES, SIDE, TURNING, UP, neck_face
 
@@ -274,3 +274,177 @@ def test_an_override_of_a_linked_face_fires_them(face, tmp_path):
     _pose(rig, "head", turn)
     scene.update(scene.controls(rig))
     np.testing.assert_allclose(_shown(rig), _wanted(dna, head=turn), atol=1e-5)
+
+
+def _nods(rig):
+    """Keys of the head's control bone, of which a constraint on the joint's bone lets half pass."""
+    bone = scene.controls(rig).pose.bones["head"]
+    bone.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (5, 0.8)):
+        bone.rotation_euler = (angle, 0.1, 0.2)
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    hold = rig.pose.bones["head"].constraints.new("LIMIT_ROTATION")
+    hold.owner_space, hold.use_limit_x, hold.use_limit_y = "LOCAL", True, True
+    hold.min_x, hold.max_x = -0.1, 0.1
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 5
+
+
+def _seen_turn(rig):
+    """The turn about the armature's axes that Blender shows of the head's joint."""
+    seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    bone = seen.pose.bones["head"]
+    local = seen.convert_space(
+        pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
+    )
+    rest = bone.bone.matrix_local.to_quaternion()
+    return rest @ local.to_quaternion() @ rest.inverted()
+
+
+def test_a_frame_under_a_constraint_depends_on_no_frame_before_it(face):
+    rig, dna = face()
+    _nods(rig)
+    stage, seen = bpy.context.scene, {}
+    for frame in (1, 5, 2, 5, 1, 3):
+        stage.frame_set(frame)
+        wanted = _wanted(dna, head=_seen_turn(rig))
+        np.testing.assert_allclose(_shown(rig), wanted, atol=1e-5)
+        seen.setdefault(frame, wanted)
+        np.testing.assert_allclose(wanted, seen[frame], atol=1e-6)
+    assert np.abs(seen[5] - seen[1]).max() > 0.01
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    live = {}
+    for frame in seen:
+        stage.frame_set(frame)
+        live[frame] = scene.snapshot(rig)
+    assert bpy.ops.risorius.bake() == {"FINISHED"}
+    for frame, wanted in live.items():
+        stage.frame_set(frame)
+        np.testing.assert_allclose(scene.snapshot(rig), wanted, atol=2e-5)
+
+
+def test_a_joint_that_follows_something_else_is_seen_when_that_moves(face):
+    rig, dna = face()
+    target = bpy.data.objects.new("target", None)
+    bpy.context.scene.collection.objects.link(target)
+    hold = rig.pose.bones["head"].constraints.new("COPY_ROTATION")
+    hold.target, hold.owner_space = target, "LOCAL"
+    scene.update(rig)
+    target.rotation_euler = (0.4, 0.0, 0.1)
+    for _ in range(3):  # as redraws do
+        bpy.context.view_layer.update()
+    wanted = _wanted(dna, head=_seen_turn(rig))
+    np.testing.assert_allclose(_shown(rig), wanted, atol=1e-5)
+    assert np.abs(wanted - _wanted(dna)).max() > 0.01
+
+
+def test_keys_of_a_joints_own_bone_fire_them(face):
+    rig, dna = face()
+    bone = rig.pose.bones["head"]
+    for frame, angle in ((1, 0.0), (5, 0.5)):
+        bone.rotation_quaternion = Quaternion((1.0, 0.0, 0.0), angle)
+        bone.keyframe_insert("rotation_quaternion", frame=frame)
+    for frame in (5, 1, 3):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_allclose(_shown(rig), _wanted(dna, head=_seen_turn(rig)), atol=1e-5)
+        assert _seen_turn(rig).angle == pytest.approx((frame - 1) / 8, abs=0.01)
+    live = scene.snapshot(rig)
+    bpy.context.view_layer.objects.active = scene.controls(rig)
+    assert bpy.ops.risorius.bake() == {"FINISHED"}
+    bpy.context.scene.frame_set(3)
+    np.testing.assert_allclose(scene.snapshot(rig), live, atol=2e-5)
+
+
+def _follow(rig, bone, by="parent"):
+    """Let the head's joint turn as an object does that follows a bone of the same armature."""
+    target = bpy.data.objects.new("target", None)
+    bpy.context.scene.collection.objects.link(target)
+    if by == "parent":
+        target.parent, target.parent_type, target.parent_bone = rig, "BONE", bone
+    else:
+        driver = target.driver_add("rotation_euler", 0).driver
+        variable = driver.variables.new()
+        variable.targets[0].id, variable.targets[0].data_path = rig, f'["channels"][{bone}]'
+        driver.expression = "var"
+    target.rotation_euler.y = 0.3
+    hold = rig.pose.bones["head"].constraints.new("COPY_ROTATION")
+    hold.target, hold.owner_space, hold.name = target, "LOCAL", "Nod"
+
+
+@pytest.mark.parametrize("follows", [("FACIAL_C_Jaw", "parent"), (4, "driver")])
+def test_a_joint_that_follows_its_own_poses_is_named_once_as_circular(face, follows, capsys):
+    rig, dna = face()
+    _follow(rig, *follows)
+    turn = Euler((0.3, -0.1, 0.2)).to_quaternion()
+    _pose(rig, "head", turn)
+    for frame in (2, 1, 2):
+        bpy.context.scene.frame_set(frame)
+        scene.update(scene.controls(rig))
+        np.testing.assert_allclose(_shown(rig), _wanted(dna, head=turn), atol=1e-5)
+    readings = scene.submodule("scene.frame.joint_readings")
+    said = readings.words(rig)
+    assert said.startswith("The constraint Nod of head is circular: it follows what the neck poses")
+    assert capsys.readouterr().out.count(said) == 1
+    holds = rig.pose.bones["head"].constraints
+    holds.remove(holds["Nod"])
+    bpy.context.scene.frame_set(1)
+    assert readings.words(rig) == ""
+
+
+def test_a_joint_that_follows_a_bone_which_no_pose_moves_is_no_circle(face):
+    rig, dna = face()
+    _follow(rig, "spine_04")
+    for frame in (2, 1):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_allclose(_shown(rig), _wanted(dna, head=_seen_turn(rig)), atol=1e-5)
+    assert scene.submodule("scene.frame.joint_readings").words(rig) == ""
+    assert _seen_turn(rig).angle > 0.1
+
+
+def test_a_layer_turns_the_neck_too(face):
+    rig, dna = face()
+    clips = scene.submodule("scene.animation.clip_actions")
+    clip = risorius.Clip(["neck.pitch", "head.yaw"], [[0.4, 0.4], [0.2, 0.2]], 24.0)
+    timing = clips.timing_of(clip, bpy.context.scene, 0.0)
+    action = clips.make_action(rig, clip, timing, "Turn").action
+    layers = scene.submodule("scene.animation.layers")
+    layers.add(scene.controls(rig), "ACTION", "Layer").action = action
+    bpy.context.scene.frame_set(0)
+    neck, head = Quaternion((-1.0, 0.0, 0.0), 0.4), Quaternion((0.0, 0.0, 1.0), 0.2)
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, neck, head), atol=1e-5)
+    assert np.abs(_shown(rig)[4:]).max() > 0.01
+
+
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_an_attached_body_fires_them_as_it_turns(face, mirrored):
+    rig, dna = face()
+    body = bpy.data.objects.new("body", bpy.data.armatures.new("body"))
+    bpy.context.scene.collection.objects.link(body)
+    body.scale, body.rotation_euler = (2.0 * mirrored, 2.0, 2.0), (0.3, 0.2, 1.0)
+    bpy.context.view_layer.objects.active = body
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, parent, roll in (("spine", None, 0.1), ("neck", "spine", 0.7), ("head", "neck", 0.4)):
+        bone = body.data.edit_bones.new(name)
+        above = body.data.edit_bones[parent] if parent else None
+        bone.head = above.tail if above else (0.0, 0.0, 1.0)
+        bone.tail, bone.roll, bone.parent = bone.head + Vector((0.02, 0.05, 0.2)), roll, above
+    bpy.ops.object.mode_set(mode="OBJECT")
+    controls = scene.controls(rig)
+    bpy.context.view_layer.objects.active = controls
+    attach = scene.submodule("scene.character.rig_placement").attach
+    bpy.context.view_layer.update()
+    attach(controls, body, "spine", "neck", "head", "NONE")
+    wanted = {}
+    bpy.context.view_layer.update()
+    from_face = (
+        np.linalg.inv(np.array(body.matrix_world)[:3, :3]) @ np.array(controls.matrix_world)[:3, :3]
+    )
+    for name, angles in (("neck", (0.2, 0.3, -0.1)), ("head", (-0.3, 0.2, 0.2))):
+        bone = body.pose.bones[name]
+        bone.rotation_mode, bone.rotation_euler = "XYZ", angles
+        rest = np.array(bone.bone.matrix_local.to_3x3())
+        turn = rest @ np.array(Euler(angles).to_matrix()) @ np.linalg.inv(rest)
+        own = np.linalg.inv(from_face) @ turn @ from_face
+        wanted[name] = Matrix(own.tolist()).to_quaternion()
+    scene.update(body)
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, wanted["neck"], wanted["head"]), atol=1e-5)
+    assert np.abs(_shown(rig)[4:]).max() > 0.01

@@ -17,7 +17,7 @@ from ..animation.actions import Track
 from ..base import drivers, parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
-from ..frame import bone_writer
+from ..frame import bone_writer, joint_readings
 from . import sampling
 
 _WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
@@ -103,12 +103,13 @@ def _bones(
         for name, values in bone_writer.pose_of(writer, deltas, samples.turns[number]).items():
             owned[name][number] = values
     owned["rotation_quaternion"] = key_reduction.continuous(owned["rotation_quaternion"])
+    keyed = joint_readings.of(rig, live).keyed
+    row_of = {int(i): row for row, i in enumerate(writer.where) if int(i) not in keyed}
     for name, values in owned.items():
         flat = np.empty((len(bones), _WIDTHS[name]), np.float32)
         target.pose.bones.foreach_get(name, flat.ravel())
-        flat[writer.where] = values[0]
+        flat[list(row_of)] = values[0][list(row_of.values())]
         target.pose.bones.foreach_set(name, flat.ravel())
-    row_of = {int(i): row for row, i in enumerate(writer.where)}
     tracks = []
     for i, bone in enumerate(bones):
         turn = _TURNS.get(bone.rotation_mode, "rotation_euler")

@@ -8,10 +8,10 @@ gives, the rest of the user's scene costs nothing, and its frame never changes.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ from ..animation import layers
 from ..base import compat, drivers, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
-from ..frame import evaluate, inputs
+from ..frame import bone_writer, evaluate, inputs, joint_readings
 
 _CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 _BONES = ("neck", "head", "eyes", "eye_L", "eye_R")
@@ -207,10 +207,14 @@ class _Reader:
         got, seen = self.samples, self.controls.evaluated_get(depsgraph)
         raw, own = inputs.read_mixed(seen, self.live, depsgraph, self.maximum)
         got.sliders[number] = raw
-        got.raw[number], turns = inputs.complete(seen, self.live, depsgraph, self.maximum, raw, own)
+        with self._turned(depsgraph, raw, own):
+            seen = self.controls.evaluated_get(depsgraph)
+            got.raw[number], turns = inputs.complete(
+                seen, self.live, depsgraph, self.maximum, raw, own
+            )
         got.turns.append(turns)
         got.places[number] = seen.matrix_world
-        self._read_control_bones(number, seen, own["head"])
+        self._read_control_bones(number, seen, own)
         if got.bones is not None:
             moved = self.rig.evaluated_get(depsgraph).pose.bones
             for name, values in got.bones.items():
@@ -222,10 +226,45 @@ class _Reader:
                 if value is not None:
                     got.others[owner].setdefault(path, []).append(value)
 
+    @contextmanager
+    def _turned(
+        self,
+        depsgraph: Depsgraph,
+        raw: NDArray[np.float32],
+        own: Mapping[str, Quaternion | None],
+    ) -> Iterator[None]:
+        """While this lasts constraints on the joints of neck and head see the turns of this frame.
+
+        Args:
+            depsgraph: at the frame; it is evaluated once more.
+            raw, own: as of inputs.read_mixed.
+        """
+        if not joint_readings.of(self.rig, self.live).places:
+            yield
+            return
+        seen = self.controls.evaluated_get(depsgraph)
+        first, turns = inputs.complete(seen, self.live, depsgraph, self.maximum, raw.copy(), own)
+        bones = self.rig.pose.bones
+        before = {n: np.empty(len(bones) * w, np.float32) for n, w in _CHANNELS.items()}
+        for name, flat in before.items():
+            bones.foreach_get(name, flat)
+        keyed = joint_readings.of(self.rig, self.live).keyed
+        joints = self.live.rig.evaluate(first).joints
+        try:
+            bone_writer.write(self.rig, self.live, joints, turns, depsgraph, keyed)
+            self.rig.update_tag(refresh={"OBJECT"})
+            with evaluate.paused():
+                cast("bpy.types.ViewLayer", depsgraph.view_layer).update()
+            yield
+        finally:
+            for name, flat in before.items():
+                bones.foreach_set(name, flat)
+            self.rig.update_tag(refresh={"OBJECT"})
+
     def _read_control_bones(
-        self, number: int, seen: ArmatureObject, head: Quaternion | None
+        self, number: int, seen: ArmatureObject, own: Mapping[str, Quaternion | None]
     ) -> None:
-        """Args: head  how it is turned with the layers, in the armature's axes; or None."""
+        """Args: own  how neck and head are turned with the layers, in the armature's axes."""
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -236,12 +275,13 @@ class _Reader:
                 if bone.constraints
                 else bone.matrix_basis
             )
-        if self.layered and head is not None and "head" in basis:
-            matrix = Matrix(basis["head"][number].tolist())
-            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
-            basis["head"][number] = Matrix.LocRotScale(
-                matrix.to_translation(), rest.inverted() @ head @ rest, matrix.to_scale()
-            )
+        for name, turn in own.items() if self.layered else ():
+            if turn is not None and name in basis:
+                matrix = Matrix(basis[name][number].tolist())
+                rest = self.controls.data.bones[name].matrix_local.to_quaternion()
+                basis[name][number] = Matrix.LocRotScale(
+                    matrix.to_translation(), rest.inverted() @ turn @ rest, matrix.to_scale()
+                )
 
 
 def _value(owner: bpy.types.ID, path: str) -> list[float] | None:

@@ -18,6 +18,9 @@ places: dict[int, object] = session.table("written.places", ("rewrite", "undo", 
 weights: dict[int, object] = session.table("written.weights", ("rewrite", "undo", "load"))
 # Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
 bone_writers: dict[int, object] = session.table("written.bone_writers", ("rewrite", "undo", "load"))
+# Deforming armature -> the Reading of frame/joint_readings.py, until the file is edited. Undo
+# keeps it: it knows what the console was told.
+readings: dict[int, object] = session.table("written.readings", ("load",))
 # Shape keys whose points were last written without an update.
 unheard: set[int] = session.keep("written.unheard", set, ("rewrite", "undo", "load"))
 # Objects of overrides that Blender lets nobody write to.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -47,6 +47,7 @@ def write(
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion],
     depsgraph: Depsgraph,
+    keyed: Collection[int] = (),
 ) -> bool:
     """Write the joints that the evaluator owns; all others keep what the user gave them.
 
@@ -56,6 +57,7 @@ def write(
         deltas: float32[J, 9] of a Pose.
         turns: "neck" and "head" -> Quaternion in the armature's axes, added on top.
         depsgraph: where the animated values of all other bones are read.
+        keyed: positions of bones of neck and head that keep what the user gave them, too.
 
     Returns:
         Whether Blender took them: it refuses bulk writes to overrides without a word.
@@ -63,19 +65,26 @@ def write(
     bones = rig.pose.bones
     writer = writer_of(rig, live)
     owned = pose_of(writer, deltas, turns)
-    if writer.buffers is None:
+    if writer.buffers is None and not keyed:
         for name, values in owned.items():
             bones.foreach_set(name, values.ravel())
         return _taken(rig, {n: v.ravel() for n, v in owned.items()})
     # A bulk write that leaves out the animated values of the others would undo them.
     seen = rig.evaluated_get(depsgraph).pose.bones
     source = seen if len(seen) == writer.count else bones
-    for name, flat in writer.buffers.items():
+    buffers = writer.buffers or _buffers(writer.count)
+    written_rows = ~np.isin(writer.where, list(keyed))
+    where = writer.where[written_rows]
+    for name, flat in buffers.items():
         source.foreach_get(name, flat)
         if name in owned:
-            flat.reshape(-1, _WIDTHS[name])[writer.where] = owned[name]
+            flat.reshape(-1, _WIDTHS[name])[where] = owned[name][written_rows]
         bones.foreach_set(name, flat)
-    return _taken(rig, writer.buffers)
+    return _taken(rig, buffers)
+
+
+def _buffers(count: int) -> dict[str, NDArray[np.float32]]:
+    return {name: np.empty(count * width, np.float32) for name, width in _WIDTHS.items()}
 
 
 def pose_of(
@@ -144,9 +153,7 @@ def _make_writer(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
         for name, joint, share in shares
         if joint in row_of
     ]
-    buffers = None
-    if len(where) < len(joints):
-        buffers = {n: np.empty(len(joints) * w, np.float32) for n, w in _WIDTHS.items()}
+    buffers = _buffers(len(joints)) if len(where) < len(joints) else None
     return Writer(
         count=len(joints),
         where=np.array(where, np.int64),

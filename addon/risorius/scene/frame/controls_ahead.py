@@ -93,14 +93,21 @@ class _Stage:
         self._data.__exit__(None, None, None)
 
 
+def is_edited() -> bool:
+    """Whether the file may have been edited since the last frame.
+
+    Without an interface scripts edit and step without an update between.
+    """
+    return _edited.now or bpy.app.background
+
+
 def is_needed() -> bool:
     """Whether anything sees a frame before its faces could be brought up after it.
 
     Else the curves would be evaluated twice for nothing. The first frame after an edit is always
     done: what was edited may read a face.
     """
-    # Without an interface scripts edit and step without an update between.
-    if _edited.now or bpy.app.background:
+    if is_edited():
         _simulated.now = caches.any_simulates()
     if _edited.now or _simulated.now:
         return True

@@ -26,7 +26,7 @@ from . import (
     channel_preview,
     controls_ahead,
     inputs,
-    joint_turns,
+    joint_readings,
     lateness,
     live_keys,
     look_masks,
@@ -102,7 +102,11 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
         scene: at its new time.
         rendering: whether the frame is rendered.
     """
-    if native.problem() or is_paused() or not controls_ahead.is_needed():
+    if native.problem() or is_paused():
+        return
+    # Constraints on joints have to see the turns of this frame before the joints are read.
+    read = _look_at_joints(controls_ahead.is_edited())
+    if not controls_ahead.is_needed() and not read:
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
     members = set(scene.objects)  # users_scene would list them once for each face
@@ -118,6 +122,16 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
         glance = _glance(seen) if _is_simple(rig, seen) else None
         wrote = evaluate(rig, depsgraph, Moment.RENDER if rendering else Moment.FRAME)
         _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
+
+
+def _look_at_joints(edited: bool) -> bool:
+    """Look once a frame what turns the joints of all faces; whether any is read from its bone."""
+    found = False
+    for rig in parts.rigs():
+        live = runtime.of(rig) if parts.BAKED not in rig else None
+        if live is not None:
+            found |= bool(joint_readings.look(rig, live, edited).places)
+    return found
 
 
 def after_frame(depsgraph: Depsgraph) -> None:
@@ -156,7 +170,7 @@ def _glance(seen: ArmatureObject) -> tuple[object, ...]:
 def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
     """Whether its control armature alone moves a character. Args: seen  that, evaluated."""
     more = lods.by_distance(rig) or parts.TEST in rig or layers.has_any(seen.original)
-    more = more or joint_turns.reads_bones(rig)
+    more = more or joint_readings.reads(rig)
     return not more and not rig_placement.body_of(seen.original) and parts.FACE in seen.pose.bones
 
 
@@ -209,7 +223,8 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     look_masks.apply(look, pose, live, lod)
     channel_preview.apply(test, pose.blend_shapes)
     times.append(perf_counter())
-    taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph)
+    keyed = joint_readings.of(rig, live).keyed
+    taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
     written.note_refusal(rig, taken)
     if not taken:
         return False  # channels and maps shall not move without the bones

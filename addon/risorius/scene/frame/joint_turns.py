@@ -3,7 +3,8 @@
 
 RBF poses of the file read them and repair neck and jaw when the head turns. The control bones,
 layers, live capture and a body turn head and neck, which is known before the frame. Where something
-else turns a joint, such as a constraint on its bone, Blender has to evaluate the bone first.
+else turns a joint, such as a constraint on its bone, Blender has to evaluate the bone first: see
+joint_readings.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from ..base import drivers, parts
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
-from . import bone_writer
+from . import joint_readings
 
 _NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
 
@@ -44,21 +45,6 @@ def are_set_by_hand(rig: ArmatureObject, controls: ArmatureObject) -> bool:
     return moved or bool(labels and drivers.used_controls(controls, labels))
 
 
-def reads_bones(rig: ArmatureObject) -> bool:
-    """Whether these rotations are read from the evaluated bones.
-
-    Args:
-        rig: deforming armature.
-    """
-    live = runtime.of(rig)
-    if live is None or not live.turning:
-        return False
-    if drivers.moves(rig) or not all(item.bone for item in live.turning):
-        return True
-    driving, bones = bone_writer.writer_of(rig, live).driving, rig.pose.bones
-    return any(bones[place].constraints for place in driving.values())
-
-
 def fill(
     seen: ArmatureObject,
     live: runtime.Runtime,
@@ -78,9 +64,7 @@ def fill(
     if not live.turning or not seen.risorius_neck_poses:
         return
     rig = parts.rig_of(seen.original)
-    found: dict[int, Quaternion] = {}
-    if rig is not None and reads_bones(rig):
-        found = _bones(rig, live, depsgraph)
+    found = _bones(rig, live, depsgraph) if rig is not None else {}
     for item in live.turning:
         if item.joint in found:
             turn, axes = found[item.joint], item.bone_axes
@@ -100,11 +84,12 @@ def _bones(
     rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph
 ) -> dict[int, Quaternion]:
     """Joint -> the rotation of its evaluated bone against its rest, about the bone's axes."""
-    seen = rig.evaluated_get(depsgraph)
+    places = joint_readings.of(rig, live).places
+    seen = rig.evaluated_get(depsgraph) if places else rig
     if not seen.is_evaluated:
         return {}
     found = {}
-    for joint, place in bone_writer.writer_of(rig, live).driving.items():
+    for joint, place in places.items():
         bone = seen.pose.bones[place]
         local = seen.convert_space(
             pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"

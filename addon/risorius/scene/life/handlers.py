@@ -21,6 +21,7 @@ from ..frame import (
     channel_preview,
     controls_ahead,
     evaluate,
+    joint_readings,
     lateness,
     look_masks,
     timing,
@@ -99,6 +100,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     """React to edits of control armatures; writes here tag the rig only, so it ends at once."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
+    joint_readings.note_edit()
     board.note_edit()
     # While a render runs beside the interface, only its own frames are written.
     if _work.busy or bpy.app.is_job_running("RENDER") or native.problem():
@@ -225,7 +227,7 @@ def _concerned(
     hold = rig_placement.body_of(controls) if controls is not None else None
     return (
         controls in armatures
-        or (rig in armatures and rig_placement.has_strayed(rig))
+        or (rig in armatures and (rig_placement.has_strayed(rig) or joint_readings.reads(rig)))
         or (hold is not None and hold.target in armatures)
         or (camera_moved and lods.by_distance(rig))
         or (bool(actions) and controls is not None and layers.plays(controls, actions))
@@ -262,6 +264,7 @@ def _restored(*_arguments: object) -> None:
     point to bones that are no more, and Blender dies of a look at them.
     """
     session.end("undo")
+    joint_readings.note_edit()
     heat.follow_undo()
     if native.problem():
         return

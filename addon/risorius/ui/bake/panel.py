@@ -3,7 +3,7 @@
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.frame import caches, hindrances, lateness
+from ...scene.frame import caches, hindrances, joint_readings, lateness
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, face_rig
@@ -38,7 +38,12 @@ def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
         rig: deforming armature.
     """
     caches.look()
-    said = (lateness.words(rig), caches.words(rig), *hindrances.words(rig))
+    said = (
+        lateness.words(rig),
+        joint_readings.words(rig),
+        caches.words(rig),
+        *hindrances.words(rig),
+    )
     for late in filter(None, said):
         words.write(layout, late, "ERROR")
 

@@ -6,7 +6,7 @@ import bpy
 from ...scene.animation import layers
 from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject, current_context
-from ...scene.frame import look_masks
+from ...scene.frame import joint_readings, look_masks
 from ...scene.why import causes, heat, present
 from .. import words
 from ..blender_types import Context, Panel, UILayout
@@ -144,6 +144,9 @@ def _draw_strongest(layout: UILayout, context: Context, rig: ArmatureObject) -> 
         _ask_soon()
     fired = causes.known(rig)
     column = layout.column(align=True)
+    circle = joint_readings.words(rig)
+    if circle:
+        words.write(column, circle, "ERROR")
     if not fired:
         words.show(column, words.say("No corrective fires."))
     for cause in fired[:_ROWS]:

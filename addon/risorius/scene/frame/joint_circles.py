@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Joints that follow what their own neck poses move.
+
+A constraint on the bone of a joint may follow, over any number of objects, a bone or a mesh that
+the poses move which the joint's rotation fires. Such a face has no pose that fits itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import cast
+
+import bpy
+import numpy as np
+
+from ...logic.base.sentences import told
+from ..base import compat, parts, saved
+from ..base.blender_types import ArmatureObject
+from ..character import runtime
+
+_BONE = re.compile(r'^pose\.bones\["((?:[^"\\]|\\.)*)"\]')
+_ARRAYS = (f'["{parts.CHANNELS}"]', f'["{parts.MAPS}"]')
+_PER_JOINT = 9  # rows of a joint in the groups of joints
+Followed = tuple[bpy.types.ID, str]  # a datablock; the bone or the property of it, or ""
+
+
+def words(cause: str) -> str:
+    """A sentence on a circle. Args: cause  from `cause`."""
+    return told(
+        "{cause} is circular: it follows what the neck poses move. The neck poses follow the "
+        "control bones instead.",
+        cause=cause,
+    )
+
+
+def cause(rig: ArmatureObject, live: runtime.Runtime, joint: int, bone: bpy.types.PoseBone) -> str:
+    """What makes a joint follow its own neck poses, in words; empty where nothing does.
+
+    Args:
+        rig: deforming armature.
+        live: the character's Runtime.
+        joint: whose rotation raw controls hold.
+        bone: its bone.
+    """
+    moved = _moved_by_poses(live)
+    if joint in moved:
+        return told("The rotation of {joint}", joint=bone.name)
+    names = {
+        item.name
+        for item in rig.data.bones
+        if saved.whole(item, parts.JOINT, -1) in moved or item.name == bone.name
+    }
+    for hold in bone.constraints:
+        seen: set[Followed] = set()
+        if any(_leads_to(rig, names, item, seen) for item in _of_constraint(hold)):
+            return told("The constraint {name} of {owner}", name=hold.name, owner=bone.name)
+    return ""
+
+
+def _moved_by_poses(live: runtime.Runtime) -> set[int]:
+    """The joints that poses of solvers and correctives move."""
+    found, raw = set[int](), len(live.dna.raw_control_names)
+    for group in live.dna.joint_groups:
+        columns = np.asarray(group.input_indices) >= raw
+        if columns.any():
+            rows = np.asarray(group.values)[:, columns].any(axis=1)
+            outputs = np.asarray(group.output_indices)[rows]
+            found |= {int(row) // _PER_JOINT for row in outputs}
+    return found
+
+
+def _leads_to(
+    rig: ArmatureObject, moved: set[str], followed: Followed, seen: set[Followed]
+) -> bool:
+    """Whether something is, or follows, what the neck poses move.
+
+    Args:
+        rig: deforming armature of the face.
+        moved: names of its bones that the poses move; what hangs on these moves too.
+        followed: what is looked at.
+        seen: what was looked at before.
+    """
+    owner, name = followed
+    if owner == rig and (name in _ARRAYS or _hangs_on(rig, name, moved)):
+        return True
+    if isinstance(owner, bpy.types.Key) or owner in parts.meshes_of(rig):
+        return not isinstance(owner, bpy.types.Key) or owner in _keys_of(rig)
+    if followed in seen or not isinstance(owner, bpy.types.Object):
+        return False
+    seen.add(followed)
+    return any(_leads_to(rig, moved, item, seen) for item in _followed_by(owner, name))
+
+
+def _hangs_on(rig: ArmatureObject, name: str, moved: set[str]) -> bool:
+    bone = rig.data.bones.get(name)
+    if bone is None:
+        return False
+    above = cast("list[bpy.types.Bone]", bone.parent_recursive)
+    return any(each.name in moved for each in (bone, *above))
+
+
+def _keys_of(rig: ArmatureObject) -> list[bpy.types.Key]:
+    keys = (item.data.shape_keys for item in parts.meshes_of(rig))
+    return [key for key in keys if key is not None]
+
+
+def _followed_by(owner: bpy.types.Object, bone: str) -> Iterator[Followed]:
+    """What an object, or a bone of it, follows straight away."""
+    if owner.parent is not None:
+        yield owner.parent, owner.parent_bone if owner.parent_type == "BONE" else ""
+    for hold in owner.constraints:
+        yield from _of_constraint(hold)
+    own = owner.pose.bones.get(bone) if owner.pose is not None else None
+    if own is not None:
+        above = cast("list[bpy.types.PoseBone]", own.parent_recursive)
+        for each in (own, *above):
+            for hold in each.constraints:
+                yield from _of_constraint(hold)
+    for modifier in owner.modifiers:
+        target = getattr(modifier, "object", None) or getattr(modifier, "target", None)
+        if isinstance(target, bpy.types.Object):
+            yield target, ""
+    data = owner.animation_data
+    for curve in data.drivers if data else ():
+        for variable in compat.driver_of(curve).variables:
+            yield from _of_variable(variable)
+
+
+def _of_constraint(hold: bpy.types.Constraint) -> Iterator[Followed]:
+    several = getattr(hold, "targets", ())
+    for item, end in ((hold, ""), (hold, "pole_"), *((each, "") for each in several)):
+        target = getattr(item, f"{end}target", None)
+        if target is not None:
+            yield target, getattr(item, f"{end}subtarget", "")
+
+
+def _of_variable(variable: bpy.types.DriverVariable) -> Iterator[Followed]:
+    for target in variable.targets:
+        if target.id is None:
+            continue
+        if variable.type != "SINGLE_PROP":
+            yield target.id, target.bone_target
+            continue
+        bone = _BONE.match(target.data_path)
+        array = next((each for each in _ARRAYS if target.data_path.startswith(each)), "")
+        yield target.id, bpy.utils.unescape_identifier(bone[1]) if bone else array

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which joints of neck and head something else than the control bones turns.
+
+Their rotations are read from the evaluated bones. Asked once a frame and after edits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..base import compat, console, drivers, parts, written
+from ..base.blender_types import ArmatureObject
+from ..character import runtime
+from . import bone_writer, joint_circles
+
+
+@dataclass
+class Reading:
+    """What turns the joints of one face, until its file is edited.
+
+    Attributes:
+        wiring: what is compared to see whether it still holds.
+        keyed: positions of the bones of neck and head that keys or drivers of the deforming
+            armature turn: these lead, the evaluator does not write them.
+        places: joint -> position of its bone, of the joints whose rotation is read from the bone.
+        circle: why joints with constraints are not read, in words; empty where all are.
+        is_fresh: whether nothing was edited since.
+    """
+
+    wiring: tuple[object, ...]
+    keyed: frozenset[int]
+    places: dict[int, int]
+    circle: str
+    is_fresh: bool = True
+
+
+def of(rig: ArmatureObject, live: runtime.Runtime) -> Reading:
+    """What turns the joints of a face, as last looked at.
+
+    Args:
+        rig: deforming armature.
+        live: the character's Runtime.
+    """
+    kept = written.readings.get(rig.session_uid)
+    if isinstance(kept, Reading) and kept.is_fresh:
+        return kept
+    return look(rig, live, edited=True)
+
+
+def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
+    """Look anew what turns the joints of a face; a circle that is new is told to the console.
+
+    Args:
+        rig: deforming armature.
+        live: the character's Runtime.
+        edited: whether the file was edited since the last look: else only what stands on the face
+            itself is compared.
+    """
+    kept = written.readings.get(rig.session_uid)
+    before = kept if isinstance(kept, Reading) else None
+    writer = bone_writer.writer_of(rig, live)
+    wiring = _wiring(rig, writer)
+    if before is not None and before.wiring == wiring and not edited:
+        before.is_fresh = True
+        return before
+    keyed = _keyed(rig, writer)
+    bones, places, circles = rig.pose.bones, dict[int, int](), list[str]()
+    for item in live.turning:
+        place = writer.driving.get(item.joint)
+        if place is None or not (not item.bone or place in keyed or len(bones[place].constraints)):
+            continue
+        circle = joint_circles.cause(rig, live, item.joint, bones[place])
+        if circle:
+            circles.append(circle)
+        else:
+            places[item.joint] = place
+    found = Reading(wiring, keyed, places, next(iter(circles), ""))
+    written.readings[rig.session_uid] = found
+    if found.circle and (before is None or before.circle != found.circle):
+        console.say(f"{rig.name}: {joint_circles.words(found.circle)}")
+    return found
+
+
+def reads(rig: ArmatureObject) -> bool:
+    """Whether rotations of a face are read from its bones. Args: rig  deforming armature."""
+    live = runtime.of(rig) if parts.BAKED not in rig else None
+    return live is not None and bool(live.turning and of(rig, live).places)
+
+
+def note_edit() -> None:
+    """Something was edited: what turns the joints of faces is looked at anew when it is needed."""
+    for kept in written.readings.values():
+        if isinstance(kept, Reading):
+            kept.is_fresh = False
+
+
+def words(rig: ArmatureObject) -> str:
+    """What the panel says of joints that follow what follows them; else empty.
+
+    Args:
+        rig: deforming armature.
+    """
+    kept = written.readings.get(rig.session_uid)
+    if not isinstance(kept, Reading) or not kept.circle:
+        return ""
+    return joint_circles.words(kept.circle)
+
+
+def _wiring(rig: ArmatureObject, writer: bone_writer.Writer) -> tuple[object, ...]:
+    bones = rig.pose.bones
+    holds = tuple(
+        (place, hold.name, hold.type, hold.mute)
+        for place in writer.driving.values()
+        for hold in bones[place].constraints
+    )
+    if not drivers.moves(rig):
+        return (holds,)
+    actions = tuple(action.session_uid for action in compat.played_actions(rig))
+    return holds, actions, len(rig.animation_data.drivers) if rig.animation_data else 0
+
+
+def _keyed(rig: ArmatureObject, writer: bone_writer.Writer) -> frozenset[int]:
+    """Positions of bones of neck and head whose rotation an action, a strip or a driver moves."""
+    if not drivers.moves(rig):
+        return frozenset()
+    places = {int(writer.where[row]) for _name, row, _share, _rest in writer.turning}
+    bones = rig.pose.bones
+    named = {
+        f'pose.bones["{bpy.utils.escape_identifier(bones[place].name)}"]': place
+        for place in places | set(writer.driving.values())
+    }
+    curves = [
+        curve
+        for action in compat.played_actions(rig)
+        for curve in compat.curves_for(action, rig)
+        if not curve.mute
+    ]
+    curves += list(rig.animation_data.drivers) if rig.animation_data else []
+    split = (curve.data_path.rpartition(".") for curve in curves)
+    return frozenset(
+        named[bone] for bone, _dot, end in split if bone in named and end.startswith("rotation_")
+    )
