@@ -134,6 +134,19 @@ def make_space(
                     known=", ".join(known),
                 )
             )
+    axes = _axes(coordinate_system)
+    return Space(
+        axes=axes,
+        scale=_METRES[translation_unit] / (unit_scale or 1.0),
+        radians=np.pi / 180.0 if rotation_unit == "degrees" else 1.0,
+        sequence=tuple("xyz".index(c) for c in rotation_sequence),  # type: ignore[arg-type]
+        signs=np.where(np.asarray(rotation_signs, np.float64) < 0, -1.0, 1.0),
+        flip_faces=(face_winding_order == "cw") != bool(np.linalg.det(axes) < 0),
+    )
+
+
+def _axes(coordinate_system: Sequence[str]) -> Float:
+    """float64[3, 3]: the columns are the file's axes in Blender's. Raises: SpaceError."""
     if any(word not in _DIRECTIONS for word in coordinate_system):
         raise SpaceError(
             told(
@@ -142,22 +155,14 @@ def make_space(
             )
         )
     axes = np.array([_DIRECTIONS[word] for word in coordinate_system]).T
-    determinant = float(np.linalg.det(axes))
-    if abs(determinant) < 0.5:
+    if abs(np.linalg.det(axes)) < 0.5:
         raise SpaceError(
             told(
                 "The file's axes {coordinate_system} lie in one plane.",
                 coordinate_system=tuple(coordinate_system),
             )
         )
-    return Space(
-        axes=axes,
-        scale=_METRES[translation_unit] / (unit_scale or 1.0),
-        radians=np.pi / 180.0 if rotation_unit == "degrees" else 1.0,
-        sequence=tuple("xyz".index(c) for c in rotation_sequence),  # type: ignore[arg-type]
-        signs=np.where(np.asarray(rotation_signs, np.float64) < 0, -1.0, 1.0),
-        flip_faces=(face_winding_order == "cw") != (determinant < 0),
-    )
+    return axes
 
 
 def euler_matrices(angles: Float, sequence: Sequence[int]) -> Float:

@@ -92,7 +92,10 @@ def keep(name: str, make: Callable[[], Kept], ends: Sequence[End]) -> Kept:
         One that make made, which stays the same.
     """
     kept = make()
-    _add(name, ends, lambda: _refill(kept, make()), lambda: _is_like(kept, make()))
+    empty = isinstance(kept, Sized) and not len(kept)
+    # One that begins empty is emptied without more ado: it happens at each frame.
+    clear: Callable[[], object] | None = getattr(kept, "clear", None) if empty else None
+    _add(name, ends, clear or (lambda: _refill(kept, make())), lambda: _is_like(kept, make()))
     return kept
 
 

@@ -93,12 +93,7 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     given = g.node("NodeGroupInput").outputs[CARDS]
     source = g.node("GeometryNodeObjectInfo", {"Object": given}, transform_space="RELATIVE")
     mesh = source.outputs["Geometry"]
-    count = kind.each * len(item.data.vertices) // (2 * rows)
-    line = g.node("GeometryNodeCurvePrimitiveLine")
-    line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
-    dots = g.node("GeometryNodePoints", {"Count": count})
-    many = g.node("GeometryNodeInstanceOnPoints", {0: dots.outputs[0], "Instance": line.outputs[0]})
-    real = g.node("GeometryNodeRealizeInstances", {0: many.outputs[0]})
+    lines = _lines(g, kind.each * len(item.data.vertices) // (2 * rows), rows)
     # All strands have as many points as a card has rows: numbers follow from a point's own.
     index = g.node("GeometryNodeInputIndex").outputs[0]
     strand = g.group(index, rows)
@@ -123,15 +118,12 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
             _slid(g, mesh, place, end, start, share)
             for end, start in zip(ends, starts, strict=True)
         ]
-    parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
-    parted.inputs["Min"].default_value = [-kind.apart / unit] * 3
-    parted.inputs["Max"].default_value = [kind.apart / unit] * 3
-    aside = g.node("ShaderNodeVectorMath", {0: parted.outputs["Value"]}, operation="SCALE")
+    aside = _aside(g, lock, kind.apart / unit)
     g.put(g.math("DIVIDE", row, rows - 1), aside.inputs["Scale"])
     moved = g.node(
         "GeometryNodeSetPosition",
         {
-            "Geometry": real.outputs[0],
+            "Geometry": lines.outputs[0],
             "Position": g.between(ends[0], ends[1], across),
             "Offset": aside.outputs[0],
         },
@@ -144,6 +136,23 @@ def strand_tree(item: MeshObject, rows: int, kind: Kind, unit: float) -> NodeTre
     out = g.node("NodeGroupOutput")
     tree.links.new(painted.outputs[0], out.inputs[0])
     return tree
+
+
+def _lines(g: _Tree, count: int, rows: int) -> Node:
+    """Straight curves, a point of each for each row of a card. Args: count  of the curves."""
+    line = g.node("GeometryNodeCurvePrimitiveLine")
+    line = g.node("GeometryNodeResampleCurve", {"Curve": line.outputs[0], "Count": rows})
+    dots = g.node("GeometryNodePoints", {"Count": count})
+    many = g.node("GeometryNodeInstanceOnPoints", {0: dots.outputs[0], "Instance": line.outputs[0]})
+    return g.node("GeometryNodeRealizeInstances", {0: many.outputs[0]})
+
+
+def _aside(g: _Tree, lock: Socket, most: float) -> Node:
+    """A move of each lock, at most so far along each axis; its Scale is free."""
+    parted = g.node("FunctionNodeRandomValue", {"ID": lock, "Seed": 4}, data_type="FLOAT_VECTOR")
+    parted.inputs["Min"].default_value = [-most] * 3
+    parted.inputs["Max"].default_value = [most] * 3
+    return g.node("ShaderNodeVectorMath", {0: parted.outputs["Value"]}, operation="SCALE")
 
 
 def _slid(
