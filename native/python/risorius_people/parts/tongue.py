@@ -14,16 +14,8 @@ from risorius.base.easing import smooth_step
 from ..polygons import Floats, Ints
 
 OUT = "tongueOut"
-# What lifts the middle of the lower lip by a millimetre or more, of both sides or of the whole
-# mouth: under it the tongue would come through the lip's skin.
-LIFTING = {
-    "mouthCornerPull": "LR",
-    "mouthPressD": "LR",
-    "mouthLipsPress": "LR",
-    "mouthLowerLipRollIn": "LR",
-    "jawChinRaiseD": "LR",
-    "mouthDown": "",
-}
+# What lifts the middle of the lower lip farther than an open jaw takes the tongue off it.
+LIFTING = ("mouthCornerPull", "mouthPressD", "jawChinRaiseD")
 _JAW = 0.08  # by how much an open jaw takes the tongue off the lip, in which the data's lies
 _BEHIND = 0.22  # how far behind the lip the tongue begins to rise
 _EVEN = 0.05  # across: over such a width the lip's lift is evened out
@@ -47,7 +39,7 @@ def over_lip(
     near = np.exp(-(((at[:, :1] - lip[None, :, 0]) / _EVEN) ** 2)) + 1e-12
     near /= near.sum(axis=1, keepdims=True)
     out = {}
-    for name in (n + side for n, sides in LIFTING.items() for side in sides or [""]):
+    for name in (n + side for n in LIFTING for side in "LR"):
         lift = np.maximum(near @ units[name][rim, 1], 0.0)
         out[(name, OUT)] = _up(positions, tongue, share * lift)
     out[("jawOpen", OUT)] = _up(positions, tongue, share * _JAW)
