@@ -113,7 +113,5 @@ def _write(hand: Hand, region: str, column: float, text: str) -> None:
     hand.type(text)
     hand.key("Return")
     hand.still()
-    hand.key("Return")  # 5.2 goes on editing a folder
-    hand.still()
     left, top, width, height = hand.ask("browser_region", kind="WINDOW")
     hand.move(left + width * 0.5, top + height * 0.6)
