@@ -321,6 +321,18 @@ def test_blenders_pose_pasted_flipped_swaps_sides_on_the_board(rig):
     assert dict(scene.face(rig).items()) == sliders
 
 
+def test_blenders_pose_pasted_flipped_swaps_sides_on_a_primary_board(primary):
+    put(primary, **{CORNER_L: (0.0, 0.7)})
+    bpy.context.view_layer.objects.active = scene.controls(primary)
+    bpy.ops.object.mode_set(mode="POSE")
+    bpy.ops.risorius.select_board(region="ALL")
+    bpy.ops.pose.copy()
+    assert bpy.ops.risorius.paste_pose_flipped() == {"FINISHED"}
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert handle(primary, CORNER_R).location.to_tuple(4) == (0.0, 0.7, 0.0)
+    assert handle(primary, CORNER_L).location.to_tuple(4) == (0.0, 0.0, 0.0)
+
+
 def test_a_drag_moves_the_board_where_it_leads(rig, board_file):
     put(rig, **{JAW: (0.0, 0.2)})
     sliders = dict(scene.face(rig).items())
@@ -457,7 +469,7 @@ def test_what_is_baked_plays_whoever_led(rig, kind):
             assert np.abs(scene.snapshot(rig) - wanted).max() < 1e-6 * np.ptp(wanted)
 
 
-CORNER_L, CORNER_R = "face_mouth_corner_L", "face_mouth_corner_R"
+CORNER_L, CORNER_R = "face_L_mouth_corner", "face_R_mouth_corner"
 
 
 @pytest.fixture
@@ -469,7 +481,7 @@ def primary(board_file):
 
 def test_a_primary_board_moves_the_face_by_its_own_handles(primary, board_file):
     names = {bone.name for bone in scene.controls(primary).pose.bones}
-    assert {"face_jaw", "face_gaze", CORNER_L, CORNER_R, "face_brow_inner_L"} <= names
+    assert {"face_jaw", "face_gaze", CORNER_L, CORNER_R, "face_L_brow_inner"} <= names
     assert "face_tongue" not in names  # this face has no tongue
     assert not names & {JAW, LOOK}
     put(primary, face_jaw=(0.0, -0.5), face_gaze=(0.4, -0.2), **{CORNER_L: (0.7, 0.3)})

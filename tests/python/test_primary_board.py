@@ -72,7 +72,7 @@ def _index() -> dict[str, int]:
 
 def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[str]) -> None:
     gui = np.zeros((1, len(table.names)))
-    values = {"face_mouth_corner_L.ty": 0.6, "face_lips.ty": -0.5, "face_gaze.tx": -0.3}
+    values = {"face_L_mouth_corner.ty": 0.6, "face_lips.ty": -0.5, "face_gaze.tx": -0.3}
     for name, value in values.items():
         gui[0, table.names.index(name)] = value
     raw = dict(zip(labels, table.raw(gui)[0], strict=True))
@@ -91,7 +91,7 @@ def test_halves_of_an_axis_add_up_and_are_found_again(table: Any, labels: list[s
 
 def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: Any) -> None:
     """A brow goes down by its inner or its outer end, while the other end goes up."""
-    names = [f"face_brow_{end}_L.ty" for end in ("inner", "outer")]
+    names = [f"face_L_brow_{end}.ty" for end in ("inner", "outer")]
     inner, outer = (table.names.index(name) for name in names)
     for up, down in ((inner, outer), (outer, inner)):
         for high, low in ((0.3, -0.8), (0.8, -0.3)):
@@ -107,7 +107,7 @@ def test_two_handles_that_lead_to_one_control_make_room_for_each_other(table: An
 def test_a_face_with_fewer_controls_has_fewer_handles_and_shorter_ways() -> None:
     few = ["a.jawOpen", "a.jawLeft", "a.eyeBlinkL", "a.mouthCornerPullR", "thing"]
     table = primary.table_of(few)
-    assert table.names == ("face_lid_upper_L.ty", "face_mouth_corner_R.ty", "face_jaw.tx",
+    assert table.names == ("face_L_lid_upper.ty", "face_R_mouth_corner.ty", "face_jaw.tx",
                            "face_jaw.ty")  # fmt: skip
     assert table.lowest.tolist() == [-1.0, 0.0, 0.0, -1.0]
     assert table.highest.tolist() == [0.0, 1.0, 1.0, 0.0]
@@ -127,11 +127,11 @@ def test_handles_keep_apart_and_lie_as_one_sees_a_face(board: Any) -> None:
     at = {handle.bone: handle.place for handle in board.handles}
     middle = at["face_gaze"][0]
     for bone, (x, y) in at.items():
-        if bone.endswith("_L"):
-            other = at[bone[:-1] + "R"]
+        if bone.startswith("face_L_"):
+            other = at[bone.replace("_L_", "_R_")]
             assert x > middle
             assert (x - middle, y) == (pytest.approx(middle - other[0]), other[1])
-    order = ("brow_inner_L", "gaze", "nose_L", "mouth", "lips", "jaw")
+    order = ("L_brow_inner", "gaze", "L_nose", "mouth", "lips", "jaw")
     heights = [at[f"face_{name}"][1] for name in order]
     assert heights == sorted(heights, reverse=True)
     half = board.width / 2, board.height / 2
@@ -143,8 +143,8 @@ def test_outwards_is_outwards_and_left_is_where_the_face_goes(table: Any) -> Non
         handles = {handle.bone: handle for handle in primary.handles_of(table, sideways)}
         return handles[bone].x.way
 
-    assert way("face_mouth_corner_L", {}) == layout.RIGHT
-    assert way("face_mouth_corner_R", {}) == layout.LEFT
+    assert way("face_L_mouth_corner", {}) == layout.RIGHT
+    assert way("face_R_mouth_corner", {}) == layout.LEFT
     jaw = table.names.index("face_jaw.tx")
     assert way("face_jaw", {jaw: 0.4}) == layout.RIGHT
     assert way("face_jaw", {jaw: -0.4}) == layout.LEFT  # this face's left is the viewer's

@@ -113,8 +113,12 @@ class _Way:
 
 
 def bone_of(part: Part, side: str) -> str:
-    """The bone of a handle. Args: part  which it is; side  "L" or "R", "" for one of no side."""
-    return f"face_{part.stem}_{side}" if side else f"face_{part.stem}"
+    """The bone of a handle. Args: part  which it is; side  "L" or "R", "" for one of no side.
+
+    The side stands where Blender sees none: it mirrors about the armature's middle, which is not
+    the board's.
+    """
+    return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 
 
 def table_of(labels: Sequence[str]) -> BoardTable:
@@ -124,7 +128,7 @@ def table_of(labels: Sequence[str]) -> BoardTable:
         labels: the names of its raw controls.
 
     Returns:
-        BoardTable, whose GUI controls are called by the bones: `face_mouth_corner_L.ty`.
+        BoardTable, whose GUI controls are called by the bones: `face_L_mouth_corner.ty`.
     """
     index = {slider_words.short_name(label): i for i, label in enumerate(labels)}
     found: list[str] = []

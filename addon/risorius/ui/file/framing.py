@@ -80,38 +80,46 @@ def show_whole(context: Context, rig: ArmatureObject) -> int:
 
 
 def show_with_board(context: Context, rig: ArmatureObject) -> None:
-    """Let the 3D views of the window show head and face board beside each other, from the front.
+    """Let a 3D view show head and face board beside each other, from the front.
 
-    What sidebar, toolbar and headers cover is left free. A view through a camera leaves the camera;
-    one that is locked to an object or the 3D cursor stays.
+    It is that of the context, which leaves its camera for it, else the largest that looks through
+    none. What sidebar, toolbar and headers cover is left free. A view that is locked to an object
+    or the 3D cursor stays.
 
     Args:
         context: a Blender context; without a window nothing happens.
         rig: deforming armature of the face, with a board.
     """
-    screen = context.window.screen if context.window is not None else None
+    area = _largest_or_own(context)
+    region = _window_of(area) if area is not None else None
+    space = _view(area) if area is not None else None
+    view = space.region_3d if space is not None else None
+    if area is None or region is None or space is None or view is None or _is_locked(space):
+        return
+    if view.view_perspective == "CAMERA":
+        view.view_perspective = "PERSP"
     controls = parts.controls_there(rig)
     turn = (controls.matrix_world.to_quaternion() @ _FRONT).to_track_quat("Z", "Y")
     corners = np.concatenate([_corners(rig), board_bones.corners(controls)])
     points = corners @ np.array(turn.to_matrix(), np.float64)
     depth = float(points[-1, 2])  # of the board: there the view turns
-    for area in screen.areas if screen is not None else ():
-        region = _window_of(area) if area.type == "VIEW_3D" else None
-        if region is None or _is_locked(_view(area)):
-            continue
-        space, size = _view(area), (region.width, region.height)
-        for view in (space.region_3d, *space.region_quadviews)[:1]:
-            if view is None:
-                continue
-            if view.view_perspective == "CAMERA":
-                view.view_perspective = "PERSP"
-            perspective = view.view_perspective == "PERSP"
-            right, up, far = view_fit.fit(
-                points - (0.0, 0.0, depth), space.lens, size, _free_part(area, region), perspective
-            )
-            view.view_rotation = turn
-            view.view_location = turn @ Vector((right, up, depth))
-            view.view_distance = far
+    size, perspective = (region.width, region.height), view.view_perspective == "PERSP"
+    free = _free_part(area, region)
+    right, up, far = view_fit.fit(points - (0.0, 0.0, depth), space.lens, size, free, perspective)
+    view.view_rotation = turn
+    view.view_location = turn @ Vector((right, up, depth))
+    view.view_distance = far
+
+
+def _largest_or_own(context: Context) -> bpy.types.Area | None:
+    """The context's 3D view, else the window's largest one that looks through no camera."""
+    screen = context.window.screen if context.window is not None else None
+    areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
+    if context.area in areas:
+        return context.area
+    views = [(a, _view(a).region_3d) for a in areas]
+    free = [a for a, view in views if view is not None and view.view_perspective != "CAMERA"]
+    return max(free, key=lambda area: area.width * area.height, default=None)
 
 
 def _free_part(area: bpy.types.Area, region: bpy.types.Region) -> view_fit.Box:
