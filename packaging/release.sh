@@ -7,11 +7,12 @@
 # once).
 #
 #   RISORIUS_SITE=https://... is the address of the documentation, for Blender's Online Manual
-#   release.sh VERSION [--trial]   --trial: also of a tree that could not be released; says why not, and
-#                                  takes the wheels that there are
+#   release.sh VERSION [--trial]   VERSION: 1.2.3, or its tag v1.2.3; --trial: also of a tree that could
+#                                  not be released; says why not, and takes the wheels that there are
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 version=${1:-}
+version=${version#v}
 trial=${2:-}
 if [ -z "$version" ] || { [ -n "$trial" ] && [ "$trial" != --trial ]; }; then
   echo "release.sh: release.sh VERSION [--trial]" >&2 && exit 2

@@ -3,10 +3,10 @@
 # site.sh: the documentation as a site in build/site/html, by mkdocs-material: what is written in docs/
 # and the READMEs, a page for each panel and operator from the registered classes, the commands from
 # --help, Python from docstrings, C++ from headers. A warning is an error; every link of the finished
-# pages is followed. Needs the extension's zip in build/dist.
+# pages is followed. Needs the extension's zip in build/dist, which --build makes from nothing.
 # Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code 0 only if nothing failed.
 #
-#   site.sh
+#   site.sh [--build]
 set -uo pipefail
 source "$(dirname "$0")/setup.sh"
 source "$project/packaging/works.sh"
@@ -22,6 +22,11 @@ site_tools() {
   python3.11 -m venv "$tools" && "$tools/bin/python" -m pip install -q -r "$own/requirements.txt" &&
     touch "$stamp"
 }
+case "${1:-}" in
+  "") ;;
+  --build) install_packages && make_venv && build_wheel && build_extension || exit 1 ;;
+  *) echo "site.sh: $1 is not --build" >&2 && exit 2 ;;
+esac
 zip=$(ls "$project"/build/dist/risorius-*.zip 2> /dev/null | head -n 1)
 [ -n "$zip" ] || { echo "site.sh: there is no build/dist/risorius-*.zip: build_extension" >&2 && exit 1; }
 

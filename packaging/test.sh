@@ -175,16 +175,16 @@ run_program() { # run_program BLENDER: a program of 4.2 or newer
   fi
 }
 run_style() {
-  check "ruff check" "$venv/bin/ruff" check native addon tests blender_tests packaging
-  check "ruff format" "$venv/bin/ruff" format --check -q native addon tests blender_tests packaging
-  check "clang-format" sh -c \
-    "find native tests -name '*.h' -o -name '*.cpp' | xargs '$venv/bin/clang-format' --dry-run -Werror"
+  local name
+  for name in ruff-check ruff-format clang-format; do
+    check "$name" packaging/check/style.sh "$name"
+  done
 }
 run_types() {
-  check "mypy of the package" "$venv/bin/mypy" --no-error-summary -p risorius
-  check "mypy of addon/logic" "$venv/bin/mypy" --no-error-summary --explicit-package-bases \
-    --follow-imports=silent addon/risorius/logic
-  check "pyright of the add-on" "$venv/bin/pyright"
+  local name
+  for name in mypy-package mypy-logic pyright; do
+    check "$name" packaging/check/style.sh "$name"
+  done
 }
 run_pytest() {
   local code version files slow=()

@@ -12,11 +12,8 @@ declare -A winpython_hash=(
   [3.11]=b6d6b1071cbed92691e7c37f25f3dcc814cdee2a99b154dcdd1d78c3da7ec863
   [3.13]=2538b7dd20f9b9bbc7f501ac625285255dccf73d85297b9c3b61d4213ef7de43)
 
-# What each room of the package does with the system: files, locks, bytes, threads, sockets, processes.
-tests_of_the_system=(open_files locking fileio dna_saving rig_files clip_file live interrupts odd_bytes
-  command_check dna_golden rig_golden rig_api command_convert)
-tests_of_the_system=("${tests_of_the_system[@]/%/.py}")
-tests_of_the_system=("${tests_of_the_system[@]/#/tests/python/test_}")
+# The tests of what the package asks the system for: files, locks, bytes, threads, sockets, processes.
+mapfile -t tests_of_the_system < "$project/packaging/cross/tests_of_the_system.txt"
 
 # windows_python VERSION: prints the folder of python.exe, include and libs
 windows_python() {
