@@ -79,7 +79,9 @@ def test_the_page_holds_what_the_face_does_and_says(dna_file, tmp_path, sound, m
 def test_without_the_page_or_a_folder_it_is_one_sentence(dna_file, tmp_path, monkeypatch):
     scene.load(dna_file)
     monkeypatch.setattr(pages, "_EMPTY", "not_there.html")
-    with pytest.raises(RuntimeError, match=r"^Error: [^\n]*packaging/web\.sh makes it[^\n]*\n?$"):
+    with pytest.raises(
+        RuntimeError, match=r"^Error: [^\n]*packaging/ship/web\.sh makes it[^\n]*\n?$"
+    ):
         _export(tmp_path / "face.html", use_animation=False)
     monkeypatch.setattr(pages, "empty_page", lambda: EMPTY)
     with pytest.raises(RuntimeError, match=r"^Error: [^\n]+\n?$"):

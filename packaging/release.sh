@@ -18,7 +18,7 @@ if [ -z "$version" ] || { [ -n "$trial" ] && [ "$trial" != --trial ]; }; then
   echo "release.sh: release.sh VERSION [--trial]" >&2 && exit 2
 fi
 cd "$project"
-make="packaging/release/make.py"
+make="packaging/ship/release/make.py"
 out="$project/build/release/$version"
 
 # shellcheck disable=SC2086
@@ -26,9 +26,9 @@ checked() { "$python" $make check "$version" >&2 || { [ -n "$trial" ] && echo "A
 gather_wheels() { # of wheels.sh; a trial does with what was built for this machine
   shopt -s nullglob
   if [ -z "$trial" ]; then
-    packaging/web.sh # the wheels that are built now have it
+    packaging/ship/web.sh # the wheels that are built now have it
     rm -rf "$project/build/wheels"
-    packaging/wheels.sh
+    packaging/ship/wheels.sh
   fi
   wheels=("$project"/build/wheels/risorius-"$version"-*.whl)
   [ ${#wheels[@]} -gt 0 ] || { [ -n "$trial" ] && wheels=("$project"/build/dist/risorius-"$version"-*.whl); }
@@ -57,8 +57,8 @@ mapfile -t zips < <("$python" $make zips "$out" --wheels "${wheels[@]}" --sample
 step "SBOM, notes, checksums"
 tools="$project/build/venv-release"
 [ -e "$tools/.made" ] || { python3.11 -m venv "$tools" &&
-  "$tools/bin/python" -m pip install -q -r packaging/release/requirements.txt && touch "$tools/.made"; }
-"$tools/bin/python" packaging/release/sbom.py "$version" "$out" > "$out/risorius-$version.cdx.json"
+  "$tools/bin/python" -m pip install -q -r packaging/ship/release/requirements.txt && touch "$tools/.made"; }
+"$tools/bin/python" packaging/ship/release/sbom.py "$version" "$out" > "$out/risorius-$version.cdx.json"
 "$python" $make notes "$version" > "$out/NOTES.md"
 "$python" $make sums "$out"
 step ""

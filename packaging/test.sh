@@ -3,7 +3,7 @@
 # test.sh: every test, from nothing: native, Python, Blender (all in bpy 4.5 and in each `blender` of
 # 4.2 or newer that is found on PATH or named by BLENDER=; a fast subset in bpy 4.2 and 5.0, where
 # they can be fetched). At the end: seconds of each stage, what ran where, what did not run and why.
-# Exit code 0 only if all passed. packaging/matrix.sh runs all Blender tests in all versions.
+# Exit code 0 only if all passed. packaging/check/blender/matrix.sh runs all Blender tests in all versions.
 #
 #   ./packaging/test.sh            everything; about half an hour on two quiet cores
 #   ./packaging/test.sh --quick    the quick ones of GoogleTest and of the Python tests, and the front
@@ -27,7 +27,7 @@ cd "$project" || exit 1
 logs="$project/build/logs"
 rm -rf "$logs/rows" "$logs/extension.made" "$logs"/subset-*
 mkdir -p "$logs/rows"
-source packaging/rows.sh
+source packaging/check/rows.sh
 # Tests that try every byte run under the sanitizers, which see more, and --quick has none of them.
 # What only computes for long is not run under the sanitizers: shorter tests go through the same lines.
 # Of the programs of GoogleTest, those whose subject the compiler's optimisation or the machine may change,
@@ -66,7 +66,8 @@ google_tests() {
     while read -r line; do say "NOT RUN, $name: ${line,}"; done
 }
 run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are rows
-  local log="$logs/${1%.sh}.log" code name good bad
+  local script=${1##*/} log code name good bad
+  log="$logs/${script%.sh}.log"
   "$project/packaging/$1" "${@:2}" > "$log" 2>&1
   code=$?
   while IFS=$'\t' read -r _ name good bad; do
@@ -75,11 +76,11 @@ run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are row
   while IFS=$'\t' read -r _ name; do say "$name"; done < <(grep -P '^say\t' "$log")
   # One that only says that it did not run has passed nothing.
   [ "$code" -eq 0 ] && ! grep -qP '^row\t' "$log" && grep -qP '^say\t' "$log" && return
-  check "$1" [ "$code" -eq 0 ] || tail -n 40 "$log"
+  check "$script" [ "$code" -eq 0 ] || tail -n 40 "$log"
 }
 run_fuzzers() { # run_fuzzers SECONDS
   local code target executions finds
-  "$project/packaging/fuzz.sh" --each "$1" > "$logs/fuzz.log" 2>&1
+  "$project/packaging/check/fuzz.sh" --each "$1" > "$logs/fuzz.log" 2>&1
   code=$?
   # A row: target, executions, each second, coverage, corpus, finds.
   while read -r target executions _ _ _ finds; do
@@ -111,12 +112,12 @@ native_lane() {
   step "one Rig under eight threads"
   google_tests "thread sanitizer, one Rig" tsan
   step "other compilers, systems and processors"
-  run_script cross.sh
+  run_script check/cross.sh
   step "fuzz targets, 5 s each"
   run_fuzzers 5
   extension_is_there || return # of the same lane as the wheel, which the next step needs
   step "C library for other programs"
-  run_script host.sh
+  run_script check/host.sh
   run_subsets
 }
 # Waits for the python lane's extension; zip is its path.
@@ -216,8 +217,8 @@ python_lane() {
   step "Python tests"
   run_pytest
   [ "$mode" = --quick ] && return
-  step "documentation as a site" && run_script site.sh
-  step "the Windows wheel in wine" && run_script windows.sh --there
+  step "documentation as a site" && run_script ship/site.sh
+  step "the Windows wheel in wine" && run_script ship/windows_wheels.sh --there
   run_subsets
 }
 blender_lane() {
@@ -237,7 +238,7 @@ blender_lane() {
   run_blender "bpy $version" "$(echo blender_tests/test_*.py)" "$python" blender_tests/run.py -- \
     --extension "$zip"
   run_subsets
-  say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/matrix.sh)"
+  say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/check/blender/matrix.sh)"
   for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | sort -u); do
     step "Blender tests in $blender"
     run_program "$blender"

@@ -5,8 +5,8 @@
 
 WHEELS is the folder that wheels.sh fills. The running Python (3.11 or newer) makes a venv in
 build/, and pip takes the wheel that fits. Then the wheel's own checks run, and the Python tests
-that cross/tests_of_the_system.txt names. Works on Linux, Windows and macOS. Exit code 0 only if
-all passed.
+that ship/cross/tests_of_the_system.txt names. Works on Linux, Windows and macOS. Exit code 0 only
+if all passed.
 """
 
 from __future__ import annotations
@@ -66,12 +66,16 @@ def tests(python: Path, report: Path, arguments: list[str]) -> int:
         report: where the JUnit report goes.
         arguments: of pytest; without one, the tests of what a system may do otherwise.
     """
-    named = (PACKAGING / "cross" / "tests_of_the_system.txt").read_text(encoding="utf-8").split()
+    named = (
+        (PACKAGING / "ship" / "cross" / "tests_of_the_system.txt")
+        .read_text(encoding="utf-8")
+        .split()
+    )
     command = [str(python), "-m", "pytest", "-q", "-rs", f"--junitxml={report}"]
     environment = dict(os.environ, RISORIUS_SHARED=str(report.parent / "none"))
     if os.name == "nt":
-        environment["RISORIUS_NOT_RUN"] = str(PACKAGING / "cross" / "windows_not_run.toml")
-        environment["PYTHONPATH"] = str(PACKAGING / "cross")
+        environment["RISORIUS_NOT_RUN"] = str(PACKAGING / "ship" / "cross" / "windows_not_run.toml")
+        environment["PYTHONPATH"] = str(PACKAGING / "ship" / "cross")
         command += ["-p", "windows_plugin"]
     command += arguments or named
     return subprocess.run(command, cwd=PROJECT, env=environment, check=False).returncode
@@ -87,12 +91,14 @@ def main() -> int:
     options, of_pytest = parser.parse_args(given[:end]), given[end + 1 :]
     if not list(options.wheels.glob("risorius-*.whl")):
         parser.error(
-            f"{options.wheels}: there is no wheel of risorius; packaging/wheels.sh makes them"
+            f"{options.wheels}: there is no wheel of risorius; packaging/ship/wheels.sh makes them"
         )
     build = PROJECT / "build"
     build.mkdir(exist_ok=True)
     python = make_python(options.wheels.resolve(), build / "venv-wheel")
-    checked = subprocess.run([str(python), str(PACKAGING / "selftest.py")], check=False).returncode
+    checked = subprocess.run(
+        [str(python), str(PACKAGING / "ship" / "selftest.py")], check=False
+    ).returncode
     report = (options.report or build / "wheel.xml").resolve()
     return tests(python, report, of_pytest) or checked
 

@@ -149,7 +149,7 @@ def test_a_seed_gives_the_same_acting_and_the_rules_hold(standard_controls):
 
 
 def test_a_blind_sheet_has_both_and_only_its_key_knows_which(tmp_path):
-    script = Path(__file__).resolve().parents[2] / "packaging" / "demo" / "blind.py"
+    script = Path(__file__).resolve().parents[2] / "packaging" / "films" / "blind.py"
     for which, tint in (("old", 40), ("new", 200)):
         (tmp_path / which).mkdir()
         for name in ("a.png", "b.png", f"{which}.png"):

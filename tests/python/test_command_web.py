@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The command `risorius web`: what it puts into the page, and how it says no.
 
-That a browser shows it is tried by packaging/web.sh --check."""
+That a browser shows it is tried by packaging/ship/web.sh --check."""
 
 import base64
 import gzip
@@ -146,5 +146,5 @@ def test_a_build_without_the_page_says_so_before_it_reads(monkeypatch, capsys):
     monkeypatch.setattr(pages, "_EMPTY", "not_there.html")
     assert main(["web", "gone.dna", "-o", "page.html"]) == 1
     said = capsys.readouterr().err
-    assert "packaging/web.sh makes it" in said
+    assert "packaging/ship/web.sh makes it" in said
     assert said.count("\n") == 1

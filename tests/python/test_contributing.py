@@ -72,7 +72,7 @@ def test_there_are_workflows():
 
 
 def test_an_archive_of_blender_is_looked_for_where_blender_org_has_it():
-    official = _script("official_blender")
+    official = _script("blender/official_blender")
     url, sums = official.address("4.5.15", "linux-x64", ".tar.xz")
     assert url.endswith("/release/Blender4.5/blender-4.5.15-linux-x64.tar.xz")
     assert sums.endswith("/release/Blender4.5/blender-4.5.15.sha256")
@@ -82,7 +82,7 @@ def test_an_archive_of_blender_is_looked_for_where_blender_org_has_it():
 
 
 def test_the_zip_of_this_platform_is_taken_and_not_the_one_of_the_repository(tmp_path):
-    official = _script("official_blender")
+    official = _script("blender/official_blender")
     name = f"risorius-1.2.3-{official.this_platform()[0]}.zip"
     for folder in (tmp_path / "1.2.3", tmp_path / "1.2.3" / "repository"):
         folder.mkdir()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The limits of the tests count CPU seconds and progress, not the clock (packaging/limits.py)."""
+"""The limits of the tests count CPU seconds and progress, not the clock: check/limits.py."""
 
 import re
 import subprocess

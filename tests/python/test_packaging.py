@@ -36,7 +36,7 @@ def _report(path, *cases):
 
 def test_the_wheel_for_3_11_has_the_name_that_sorts_last(tmp_path):
     # Blender 4.2.0 takes all wheels of its platform and keeps the last name.
-    build = _script("build_extension")
+    build = _script("ship/build_extension")
     version = build.manifest_version(
         (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
     )
@@ -55,7 +55,7 @@ def test_the_wheel_for_3_11_has_the_name_that_sorts_last(tmp_path):
 
 
 def test_pure_wheels_are_carried_as_they_are_and_pinned_by_hash(tmp_path):
-    build = _script("build_extension")
+    build = _script("ship/build_extension")
     version = build.manifest_version(
         (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
     )
@@ -75,7 +75,7 @@ def test_pure_wheels_are_carried_as_they_are_and_pinned_by_hash(tmp_path):
 
 
 def test_equal_files_make_an_equal_zip_with_the_face_its_licence_and_its_origin(tmp_path):
-    build = _script("build_extension")
+    build = _script("ship/build_extension")
     version = build.manifest_version(
         (build.ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
     )
@@ -113,7 +113,7 @@ def test_equal_files_make_an_equal_zip_with_the_face_its_licence_and_its_origin(
     ],
 )
 def test_tags_of_wheels_lead_to_blenders_platforms(tag, platform):
-    build = _script("build_extension")
+    build = _script("ship/build_extension")
     wheel = Path(f"risorius-1.0.0-cp311-cp311-{tag}.whl")
     if platform:
         assert build.platform_of(wheel) == platform
@@ -123,7 +123,7 @@ def test_tags_of_wheels_lead_to_blenders_platforms(tag, platform):
 
 
 def test_the_table_counts_by_version_and_file(tmp_path):
-    matrix = _script("matrix_table")
+    matrix = _script("check/blender/matrix_table")
     one = _report(
         tmp_path / "one.xml",
         ("test_a", "x", ""),
@@ -144,18 +144,18 @@ def test_the_table_counts_by_version_and_file(tmp_path):
 @pytest.mark.parametrize(("inside", "code"), [("", 0), ("<failure/>", 1), ("<error/>", 1)])
 def test_the_exit_code_tells_of_failures(tmp_path, inside, code):
     report = _report(tmp_path / "one.xml", ("test_a", "x", inside))
-    assert _script("matrix_table").main([f"1.0={report}"]) == code
+    assert _script("check/blender/matrix_table").main([f"1.0={report}"]) == code
 
 
 def test_a_blender_that_died_without_a_report_is_a_failure(tmp_path, capsys):
     report = _report(tmp_path / "one.xml", ("test_a", "x", ""))
     arguments = [f"1.0={report}", f"2.0={tmp_path / 'gone.xml'}"]
-    assert _script("matrix_table").main(arguments) == 1
+    assert _script("check/blender/matrix_table").main(arguments) == 1
     assert "Failed: 2.0" in capsys.readouterr().out
 
 
 def test_a_rendering_says_how_far_it_is_and_what_is_left():
-    module = _script("demo/progress")
+    module = _script("films/progress")
     now, said = [100.0], []
     progress = module.Progress(240, "frame", clock=lambda: now[0], say=said.append)
     for _ in range(240):
@@ -188,7 +188,7 @@ def test_blenders_says_what_it_needs(tmp_path):
     for name in ("bash", "dirname"):
         (tools / name).symlink_to(shutil.which(name))
     done = subprocess.run(
-        ["bash", PACKAGING / "blenders.sh"],
+        ["bash", PACKAGING / "check" / "blender" / "blenders.sh"],
         env={"PATH": str(tools)}, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1
@@ -197,7 +197,7 @@ def test_blenders_says_what_it_needs(tmp_path):
 
 
 def test_lines_that_never_ran_are_listed_by_function(tmp_path):
-    never = _script("never_run")
+    never = _script("check/never_run")
     unnamed = "risorius::dna::(anonymous namespace)::f(int)"
     method = "void risorius::core::List<A<B> >::g(int)"
     never.PROJECT = tmp_path
@@ -240,8 +240,8 @@ def test_lines_that_never_ran_are_listed_by_function(tmp_path):
 
 
 def test_what_nobody_tried_has_a_row_of_the_table():
-    facts = runpy.run_path(str(PACKAGING / "cross" / "facts.py"))
-    text = (PACKAGING / "wheels.sh").read_text(encoding="utf-8")
+    facts = runpy.run_path(str(PACKAGING / "ship" / "cross" / "facts.py"))
+    text = (PACKAGING / "ship" / "wheels.sh").read_text(encoding="utf-8")
     found = re.search(r"declare -A versions=\((.*?)\)\n", text, re.DOTALL)
     rows = re.findall(r'\[([\w-]+)\]="([^"]+)"', found.group(1))
     assert facts["PLANNED"] == {name: tuple(all_of.split()) for name, all_of in rows}

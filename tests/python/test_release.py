@@ -21,7 +21,7 @@ PLATFORMS = {
 
 
 def _module(name):
-    path = PROJECT / "packaging" / "release" / f"{name}.py"
+    path = PROJECT / "packaging" / "ship" / "release" / f"{name}.py"
     described = importlib.util.spec_from_file_location(f"release_{name}", path)
     module = importlib.util.module_from_spec(described)
     sys.modules[described.name] = module

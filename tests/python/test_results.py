@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
-sys.path.insert(0, str(PACKAGING))
+sys.path.insert(0, str(PACKAGING / "check"))
 
 import results  # noqa: E402
 
@@ -106,7 +106,7 @@ def _lane(tmp_path, commands):
     """The exit code of the table after a lane of these commands, run by test.sh's own functions."""
     script = f"""
       set -uo pipefail; source {PACKAGING}/setup.sh; logs={tmp_path}; mkdir -p {tmp_path}/rows
-      source {PACKAGING}/rows.sh
+      source {PACKAGING}/check/rows.sh
       lane_of_test() {{ {commands}
       }}
       run_lane one lane_of_test & wait

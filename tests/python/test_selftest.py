@@ -73,7 +73,7 @@ def test_other_bits_damage_and_folders_are_seen(monkeypatch, tmp_path):
 
 
 def test_the_script_prints_the_report_and_says_what_to_do_without_a_wheel():
-    script = [sys.executable, PROJECT / "packaging" / "selftest.py"]
+    script = [sys.executable, PROJECT / "packaging" / "ship" / "selftest.py"]
     done = subprocess.run(script, capture_output=True, text=True, encoding="utf-8", check=False)
     assert done.returncode == 0
     assert "checks passed" in done.stdout

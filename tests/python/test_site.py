@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The site's own parts: pages at their places, links; packaging/site.sh builds it."""
+"""The site's own parts: pages at their places, links; packaging/ship/site.sh builds it."""
 
 import importlib.util
 import sys
@@ -11,7 +11,7 @@ PROJECT = Path(__file__).resolve().parents[2]
 
 
 def _part(name):
-    path = PROJECT / "packaging" / "site" / f"{name}.py"
+    path = PROJECT / "packaging" / "ship" / "site" / f"{name}.py"
     described = importlib.util.spec_from_file_location(f"site_{name}", path)
     module = importlib.util.module_from_spec(described)
     sys.modules[described.name] = module
@@ -21,7 +21,7 @@ def _part(name):
 
 def test_every_page_of_the_navigation_and_all_that_it_links_to_is_there(tmp_path):
     gather = _part("gather")
-    nav = (PROJECT / "packaging" / "site" / "mkdocs.yml").read_text(encoding="utf-8")
+    nav = (PROJECT / "packaging" / "ship" / "site" / "mkdocs.yml").read_text(encoding="utf-8")
     names = gather.listed(nav)
     written = {p.relative_to(PROJECT).as_posix() for p in (PROJECT / "docs").glob("*.md")}
     assert written <= set(names)
