@@ -143,7 +143,10 @@ run_blender() {
   # shellcheck disable=SC2086  # one word a file
   note_report "$name" "$log.xml" $code --files $files
 }
-some() { printf 'blender_tests/test_%s.py ' "$@"; }
+some() { # some NAME...: the paths of these files
+  local name
+  for name; do printf '%s ' blender_tests/*/test_"$name".py; done
+}
 # At the end of each lane: what differs most between versions (installing, building, keys and actions, saved
 # files) in an older and a newer Blender. The lane that ends first takes the one, the next what is left.
 run_subsets() {
@@ -171,7 +174,7 @@ run_program() { # run_program BLENDER: a program of 4.2 or newer
   else
     check "manifest, $version" limited 60 "$1" --factory-startup --command extension \
       validate "$zip"
-    run_blender "$version" "$(echo blender_tests/test_*.py)" "$1" -b --factory-startup -noaudio \
+    run_blender "$version" "$(find blender_tests -name 'test_*.py' | sort | paste -sd ' ')" "$1" -b --factory-startup -noaudio \
       --python-exit-code 1 --python blender_tests/run.py -- --extension "$zip"
   fi
 }
@@ -188,12 +191,12 @@ run_types() {
   done
 }
 run_pytest() {
-  local code version files slow=()
+  local code version files name slow=()
   version=$("$python" -c 'import platform; print(platform.python_version())')
   files=$(find tests -name 'test_*.py')
   if [ "$mode" = --quick ]; then
-    slow=("${slow_python[@]/%/.py}")
-    slow=("${slow[@]/#/tests/python/test_}" tests/faults/test_faults.py)
+    slow=(tests/faults/test_faults.py)
+    for name in "${slow_python[@]}"; do slow+=(tests/python/*/test_"$name".py); done
     files=$(echo "$files" | grep -vxF "$(printf '%s\n' "${slow[@]}")")
   fi
   rm -f "$logs/pytest.xml"
@@ -235,7 +238,7 @@ blender_lane() {
     say "NOT RUN: all that --quick leaves out (packaging/test.sh)"
     return 0
   fi
-  run_blender "bpy $version" "$(echo blender_tests/test_*.py)" "$python" blender_tests/run.py -- \
+  run_blender "bpy $version" "$(find blender_tests -name 'test_*.py' | sort | paste -sd ' ')" "$python" blender_tests/run.py -- \
     --extension "$zip"
   run_subsets
   say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/check/blender/matrix.sh)"

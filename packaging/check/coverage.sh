@@ -10,9 +10,9 @@ cd "$project"
 out="$project/build/coverage"
 mkdir -p "$out"
 # Left out: minutes of the same few lines, unoptimised.
-slow=(tests/python/test_rig_behavior.py tests/python/test_rig_golden.py
-  tests/python/test_rig_thousand.py tests/faults tests/mutants
-  blender_tests/test_hostile.py blender_tests/test_soak.py)
+slow=(tests/python/rigs/test_rig_behavior.py tests/python/rigs/test_rig_golden.py
+  tests/python/rigs/test_rig_thousand.py tests/faults tests/mutants
+  blender_tests/extension/test_hostile.py blender_tests/extension/test_soak.py)
 changed_bytes='EveryByte|EveryPatched|EveryChangedByte|ChangedBytes|CutAtEvery|Changes.*Reads'
 
 # counted FOLDER PROGRAM...: Python with the package of FOLDER, whose lines coverage.py counts

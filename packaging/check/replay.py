@@ -5,7 +5,8 @@ python packaging/check/replay.py docs/authoring.md [FOLDER]
 
 Blocks of TOML that begin with a file's name are written, blocks of commands are run line by line
 with the `risorius` beside this Python; what needs the project's tree (python tests/...) is named
-and left out. The head of docs/authoring.md is the formula's face of tests/python/face_shapes.py.
+and left out. The head of docs/authoring.md is the formula's face of face_shapes.py, in
+tests/python/support.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def main() -> int:
     folder = Path(sys.argv[2] if len(sys.argv) > 2 else tempfile.mkdtemp())
     folder.mkdir(parents=True, exist_ok=True)
     if page.name == "authoring.md":
-        sys.path.insert(0, str(PROJECT / "tests" / "python"))
+        sys.path.insert(0, str(PROJECT / "tests" / "python" / "support"))
         import face_shapes
 
         face_shapes.write_all(folder)

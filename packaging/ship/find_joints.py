@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Finds the joints that all sample people share and writes them where the package has them: to be
-run again where the man, his controls or the fit change (tests/python/test_sample.py sees it). Two
+run again where the man, his controls or the fit change (tests/python/sample sees it). Two
 minutes on two cores, in the environment of packaging/setup.sh; the wheel is built anew after it.
 
     python packaging/ship/find_joints.py

@@ -216,7 +216,7 @@ tested() { # tested PYTHON: what of the tests has to do with the system
   # One test needs PocketSphinx, which has no wheel for 3.14.
   (cd "$project" && RISORIUS_SHARED="$cross/none" PYTHONDONTWRITEBYTECODE=1 linux_run "$1" -m pytest -q \
     -p no:cacheprovider "${tests_of_the_system[@]}" \
-    --deselect tests/python/test_interrupts.py::test_an_interrupt_is_a_sentence_and_leaves_the_old_file) > "$log" 2>&1
+    --deselect tests/python/cli/test_interrupts.py::test_an_interrupt_is_a_sentence_and_leaves_the_old_file) > "$log" 2>&1
   local code=$?
   said=$(tail -n 1 "$log")
   echo "$said"

@@ -21,7 +21,7 @@ files=("${tests_of_the_system[@]}")
 failed=0
 versions=(3.11)
 blender=
-blender_files=(blender_tests/test_{extension,controls,vertices,frames}.py)
+blender_files=(blender_tests/{extension/test_extension,character/test_{controls,vertices},frame/test_frames}.py)
 case "${1:-}" in
   "" | --there) ;;
   --all) versions=(3.11 3.13) files=(tests/python) blender=yes ;;

@@ -3,7 +3,7 @@
 
 golden.py LIBRARY FOLDER: how many records of how many files agree; exit code 1 if one does not. Of
 the files without networks and solvers, whose angles may be others of the same rotation: those are
-compared in tests/python/test_rig_behavior.py, and by tests/api with the evaluator.
+compared in tests/python/rigs/test_rig_behavior.py, and by tests/api with the evaluator.
 """
 
 from __future__ import annotations
