@@ -12,7 +12,7 @@ import pytest
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-sys.path.append(str(HERE.parent / "packaging"))  # limits
+sys.path.append(str(HERE.parent / "packaging" / "check"))  # limits
 
 MODULE = "bl_ext.user_default.risorius"
 

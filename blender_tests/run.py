@@ -34,7 +34,7 @@ def _install(package: Path) -> None:
     """Install a package through Blender's own extension system."""
     import bpy  # noqa: F401  as a module it brings addon_utils onto the path
 
-    sys.path.insert(0, str(HERE.parent / "packaging"))
+    sys.path.insert(0, str(HERE.parent / "packaging" / "check" / "blender"))
     from install_extension import install
 
     install(package.resolve())

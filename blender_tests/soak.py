@@ -27,7 +27,7 @@ import traceback
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.append(str(HERE.parent / "packaging"))
+sys.path.append(str(HERE.parent / "packaging" / "check"))
 
 import limits  # noqa: E402
 

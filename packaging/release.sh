@@ -9,17 +9,18 @@
 #   RISORIUS_PEOPLE="man woman ..." adds these sample people, each as a zip of its own
 #
 #   RISORIUS_SITE=https://... is the address of the documentation, for Blender's Online Manual
-#   release.sh VERSION [--trial]   --trial: also of a tree that could not be released; says why not, and
-#                                  takes the wheels that there are
+#   release.sh VERSION [--trial]   VERSION: 1.2.3, or its tag v1.2.3; --trial: also of a tree that could
+#                                  not be released; says why not, and takes the wheels that there are
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 version=${1:-}
+version=${version#v}
 trial=${2:-}
 if [ -z "$version" ] || { [ -n "$trial" ] && [ "$trial" != --trial ]; }; then
   echo "release.sh: release.sh VERSION [--trial]" >&2 && exit 2
 fi
 cd "$project"
-make="packaging/release/make.py"
+make="packaging/ship/release/make.py"
 out="$project/build/release/$version"
 
 # shellcheck disable=SC2086
@@ -27,9 +28,9 @@ checked() { "$python" $make check "$version" >&2 || { [ -n "$trial" ] && echo "A
 gather_wheels() { # of wheels.sh; a trial does with what was built for this machine
   shopt -s nullglob
   if [ -z "$trial" ]; then
-    packaging/web.sh # the wheels that are built now have it
+    packaging/ship/web.sh # the wheels that are built now have it
     rm -rf "$project/build/wheels"
-    packaging/wheels.sh
+    packaging/ship/wheels.sh
   fi
   wheels=("$project"/build/wheels/risorius-"$version"-*.whl)
   [ ${#wheels[@]} -gt 0 ] || { [ -n "$trial" ] && wheels=("$project"/build/dist/risorius-"$version"-*.whl); }
@@ -64,8 +65,8 @@ mapfile -t zips < <("$python" $make zips "$out" --wheels "${wheels[@]}" --sample
 step "SBOM, notes, checksums"
 tools="$project/build/venv-release"
 [ -e "$tools/.made" ] || { python3.11 -m venv "$tools" &&
-  "$tools/bin/python" -m pip install -q -r packaging/release/requirements.txt && touch "$tools/.made"; }
-"$tools/bin/python" packaging/release/sbom.py "$version" "$out" > "$out/risorius-$version.cdx.json"
+  "$tools/bin/python" -m pip install -q -r packaging/ship/release/requirements.txt && touch "$tools/.made"; }
+"$tools/bin/python" packaging/ship/release/sbom.py "$version" "$out" > "$out/risorius-$version.cdx.json"
 "$python" $make notes "$version" > "$out/NOTES.md"
 "$python" $make sums "$out"
 step ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Sourced by demo.sh, test.sh, matrix.sh, fuzz.sh and cross.sh: tools, a private venv, the wheel and
+# Sourced by the scripts of packaging/: tools, a private venv, the wheel and
 # the extension's zip. Sets: project, venv, python, step "text" (says what begins and how long the
 # last step took).
 
@@ -53,7 +53,7 @@ shown() {
 
 # limited CPU_SECONDS COMMAND...: killed when it and its children have used so much CPU, or stand still.
 # What has no limit by the clock passes on a busy machine too; bpy sometimes hangs at exit.
-limited() { python3 "$project/packaging/limits.py" "$@"; }
+limited() { python3 "$project/packaging/check/limits.py" "$@"; }
 
 install_packages() { # install_packages [MORE...]: what every build needs, and more
   local missing=()
@@ -91,9 +91,9 @@ make_venv() {
 
 quality_tools() { # clang-tidy, coverage.py and gcovr, which test.sh does without
   local stamp
-  stamp="$venv/.quality-$(sha256sum "$project/packaging/quality_requirements.txt" | cut -c1-16)"
+  stamp="$venv/.quality-$(sha256sum "$project/packaging/check/quality_requirements.txt" | cut -c1-16)"
   [ -e "$stamp" ] && return 0
-  "$python" -m pip install -q --no-compile -r "$project/packaging/quality_requirements.txt" && touch "$stamp"
+  "$python" -m pip install -q --no-compile -r "$project/packaging/check/quality_requirements.txt" && touch "$stamp"
 }
 
 # bpy_venv VERSION [SECONDS]: prints the Python of a venv with this bpy and pytest; it is made
@@ -145,6 +145,6 @@ sample_face() {
 build_extension() {
   local sample
   sample=$(sample_face) || sample=
-  "$python" "$project/packaging/build_extension.py" --wheels "$project"/build/dist/risorius-*.whl \
+  "$python" "$project/packaging/ship/build_extension.py" --wheels "$project"/build/dist/risorius-*.whl \
     --out "$project/build/dist" ${sample:+--sample "$sample"}
 }

@@ -3,7 +3,7 @@
 # test.sh: every test, from nothing: native, Python, Blender (all in bpy 4.5 and in each `blender` of
 # 4.2 or newer that is found on PATH or named by BLENDER=; a fast subset in bpy 4.2 and 5.0, where
 # they can be fetched). At the end: seconds of each stage, what ran where, what did not run and why.
-# Exit code 0 only if all passed. packaging/matrix.sh runs all Blender tests in all versions.
+# Exit code 0 only if all passed. packaging/check/blender/matrix.sh runs all Blender tests in all versions.
 #
 #   ./packaging/test.sh            everything; about half an hour on two quiet cores
 #   ./packaging/test.sh --quick    the quick ones of GoogleTest and of the Python tests, and the front
@@ -27,7 +27,7 @@ cd "$project" || exit 1
 logs="$project/build/logs"
 rm -rf "$logs/rows" "$logs/extension.made" "$logs"/subset-*
 mkdir -p "$logs/rows"
-source packaging/rows.sh
+source packaging/check/rows.sh
 # Tests that try every byte run under the sanitizers, which see more, and --quick has none of them.
 # What only computes for long is not run under the sanitizers: shorter tests go through the same lines.
 # Of the programs of GoogleTest, those whose subject the compiler's optimisation or the machine may change,
@@ -66,7 +66,8 @@ google_tests() {
     while read -r line; do say "NOT RUN, $name: ${line,}"; done
 }
 run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are rows
-  local log="$logs/${1%.sh}.log" code name good bad
+  local script=${1##*/} log code name good bad
+  log="$logs/${script%.sh}.log"
   "$project/packaging/$1" "${@:2}" > "$log" 2>&1
   code=$?
   while IFS=$'\t' read -r _ name good bad; do
@@ -75,11 +76,11 @@ run_script() { # run_script NAME [OPTION]: one of packaging/ whose steps are row
   while IFS=$'\t' read -r _ name; do say "$name"; done < <(grep -P '^say\t' "$log")
   # One that only says that it did not run has passed nothing.
   [ "$code" -eq 0 ] && ! grep -qP '^row\t' "$log" && grep -qP '^say\t' "$log" && return
-  check "$1" [ "$code" -eq 0 ] || tail -n 40 "$log"
+  check "$script" [ "$code" -eq 0 ] || tail -n 40 "$log"
 }
 run_fuzzers() { # run_fuzzers SECONDS
   local code target executions finds
-  "$project/packaging/fuzz.sh" --each "$1" > "$logs/fuzz.log" 2>&1
+  "$project/packaging/check/fuzz.sh" --each "$1" > "$logs/fuzz.log" 2>&1
   code=$?
   # A row: target, executions, each second, coverage, corpus, finds.
   while read -r target executions _ _ _ finds; do
@@ -111,12 +112,12 @@ native_lane() {
   step "one Rig under eight threads"
   google_tests "thread sanitizer, one Rig" tsan
   step "other compilers, systems and processors"
-  run_script cross.sh
+  run_script check/cross.sh
   step "fuzz targets, 5 s each"
   run_fuzzers 5
   extension_is_there || return # of the same lane as the wheel, which the next step needs
   step "C library for other programs"
-  run_script host.sh
+  run_script check/host.sh
   run_subsets
 }
 # Waits for the python lane's extension; zip is its path.
@@ -142,7 +143,10 @@ run_blender() {
   # shellcheck disable=SC2086  # one word a file
   note_report "$name" "$log.xml" $code --files $files
 }
-some() { printf 'blender_tests/test_%s.py ' "$@"; }
+some() { # some NAME...: the paths of these files
+  local name
+  for name; do printf '%s ' blender_tests/*/test_"$name".py; done
+}
 # At the end of each lane: what differs most between versions (installing, building, keys and actions, saved
 # files) in an older and a newer Blender. The lane that ends first takes the one, the next what is left.
 run_subsets() {
@@ -170,29 +174,29 @@ run_program() { # run_program BLENDER: a program of 4.2 or newer
   else
     check "manifest, $version" limited 60 "$1" --factory-startup --command extension \
       validate "$zip"
-    run_blender "$version" "$(echo blender_tests/test_*.py)" "$1" -b --factory-startup -noaudio \
+    run_blender "$version" "$(find blender_tests -name 'test_*.py' | sort | paste -sd ' ')" "$1" -b --factory-startup -noaudio \
       --python-exit-code 1 --python blender_tests/run.py -- --extension "$zip"
   fi
 }
 run_style() {
-  check "ruff check" "$venv/bin/ruff" check native addon tests blender_tests packaging
-  check "ruff format" "$venv/bin/ruff" format --check -q native addon tests blender_tests packaging
-  check "clang-format" sh -c \
-    "find native tests -name '*.h' -o -name '*.cpp' | xargs '$venv/bin/clang-format' --dry-run -Werror"
+  local name
+  for name in ruff-check ruff-format clang-format; do
+    check "$name" packaging/check/style.sh "$name"
+  done
 }
 run_types() {
-  check "mypy of the package" "$venv/bin/mypy" --no-error-summary -p risorius -p risorius_people
-  check "mypy of addon/logic" "$venv/bin/mypy" --no-error-summary --explicit-package-bases \
-    --follow-imports=silent addon/risorius/logic
-  check "pyright of the add-on" "$venv/bin/pyright"
+  local name
+  for name in mypy-package mypy-logic pyright; do
+    check "$name" packaging/check/style.sh "$name"
+  done
 }
 run_pytest() {
-  local code version files slow=()
+  local code version files name slow=()
   version=$("$python" -c 'import platform; print(platform.python_version())')
   files=$(find tests -name 'test_*.py')
   if [ "$mode" = --quick ]; then
-    slow=("${slow_python[@]/%/.py}")
-    slow=("${slow[@]/#/tests/python/test_}" tests/faults/test_faults.py)
+    slow=(tests/faults/test_faults.py)
+    for name in "${slow_python[@]}"; do slow+=(tests/python/*/test_"$name".py); done
     files=$(echo "$files" | grep -vxF "$(printf '%s\n' "${slow[@]}")")
   fi
   rm -f "$logs/pytest.xml"
@@ -216,8 +220,8 @@ python_lane() {
   step "Python tests"
   run_pytest
   [ "$mode" = --quick ] && return
-  step "documentation as a site" && run_script site.sh
-  step "the Windows wheel in wine" && run_script windows.sh --there
+  step "documentation as a site" && run_script ship/site.sh
+  step "the Windows wheel in wine" && run_script ship/windows_wheels.sh --there
   run_subsets
 }
 blender_lane() {
@@ -234,10 +238,10 @@ blender_lane() {
     say "NOT RUN: all that --quick leaves out (packaging/test.sh)"
     return 0
   fi
-  run_blender "bpy $version" "$(echo blender_tests/test_*.py)" "$python" blender_tests/run.py -- \
+  run_blender "bpy $version" "$(find blender_tests -name 'test_*.py' | sort | paste -sd ' ')" "$python" blender_tests/run.py -- \
     --extension "$zip"
   run_subsets
-  say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/matrix.sh)"
+  say "NOT RUN here: all tests in bpy 4.2, 5.0 and Blender 4.3.2, 5.2.2 (packaging/check/blender/matrix.sh)"
   for blender in $(printf '%s\n' "${BLENDER:-}" "$(command -v blender || true)" | sort -u); do
     step "Blender tests in $blender"
     run_program "$blender"

@@ -23,7 +23,8 @@ def _start(package):
     import bpy
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    sys.path[:0] = [str(HERE.parents[1]), str(HERE.parents[2] / "packaging")]
+    packaging = HERE.parents[2] / "packaging"
+    sys.path[:0] = [str(HERE.parents[1]), str(packaging / "check" / "blender")]
     from install_extension import install
 
     install(package.resolve())

@@ -20,7 +20,7 @@ import risorius
 from risorius.anim.clip import Clip
 from risorius.base.easing import smooth_step
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging" / "demo"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "packaging" / "films"))
 import acting
 
 NOISE = 0.004

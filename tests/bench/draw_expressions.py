@@ -70,7 +70,7 @@ class Face:
     def __init__(self, sample: Path, size: int, samples: int):
         import bpy
 
-        sys.path.insert(0, str(ROOT / "packaging" / "demo"))
+        sys.path.insert(0, str(ROOT / "packaging" / "films"))
         import scene as demo
 
         before = set(bpy.data.objects)

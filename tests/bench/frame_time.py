@@ -33,7 +33,7 @@ import time
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(PROJECT / "packaging"))
+sys.path.insert(0, str(PROJECT / "packaging" / "check" / "blender"))
 os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="risorius-bench-"))
 
 import bpy  # noqa: E402 isort: skip

@@ -36,7 +36,7 @@ from risorius.anim.reactions import load_exclusives
 from risorius.controls import regions
 from risorius.controls.sides import mirrored_name
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "python" / "logic"))
 import test_addon_logic  # noqa: F401  registers the package of the logic
 
 board_table = importlib.import_module("risorius_addon_logic.character.board_table")

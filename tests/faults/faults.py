@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is done to the command line, and what must hold afterwards: packaging/faults.sh runs it.
+"""What is done to the command line, and what must hold then: packaging/check/faults.sh runs it.
 
 Bombs, flipped bits, kills, interrupts, full disks, folders that cannot be written, two processes at
 once, mutants of every command's inputs. Each trial is a row: its group, its name, how often it ran,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The short part of packaging/faults.sh, and that it sees what it looks for."""
+"""The short part of packaging/check/faults.sh, and that it sees what it looks for."""
 
 import os
 import subprocess
@@ -145,7 +145,10 @@ def test_the_command_fails_with_a_fault_and_lists_what_did_not_run(monkeypatch, 
 
 def test_the_command_is_there():
     done = subprocess.run(
-        [PROJECT / "packaging" / "faults.sh", "--help"], capture_output=True, text=True, check=False
+        [PROJECT / "packaging" / "check" / "faults.sh", "--help"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert "bombs" in done.stdout

@@ -22,8 +22,8 @@ def planted(part, path, text):
     return [line for line in violations(part, files) if "are the most" not in line]
 
 
-TOP = """CHANGELOG.md CMakeLists.txt CMakePresets.json LICENSE README.md addon blender_tests docs
-native packaging pyproject.toml tests"""
+TOP = """CHANGELOG.md CMakeLists.txt CMakePresets.json CONTRIBUTING.md LICENSE README.md addon
+blender_tests docs native packaging pyproject.toml tests"""
 
 
 def test_nothing_lies_at_the_top_that_was_left_there():

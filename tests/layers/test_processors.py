@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Which processor it is, only native/simd asks, and which system core, simd and bytes alone: the
-other folders need not be compiled for each (packaging/cross.sh). risorius.h is C,
+other folders need not be compiled for each (packaging/check/cross.sh). risorius.h is C,
 for compilers of any system."""
 
 import re

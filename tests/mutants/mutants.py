@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Which small faults does a test see? Draws mutants by a seed, tries each in a copy of the project.
 
-    packaging/mutants.sh native|package|scene [--under PATH...] [--count N] [--seed N] [--list]
+    check/mutants.sh native|package|scene [--under PATH...] [--count N] [--seed N] [--list]
                          [--programs] [--survivors]
 
 A mutant is killed by the first test that fails, or that takes far longer than it does without it;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Prints a hash of everything linear that the scalar path gives for generated rigs.
-// packaging/cross.sh compiles this and the evaluator in several ways and wants one hash of all.
+// packaging/check/cross.sh compiles this and the evaluator in several ways and wants one hash.
 #include <cstdio>
 #include <cstring>
 

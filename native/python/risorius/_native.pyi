@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# The names are those of the built module: tests/python/test_stub.py compares the two.
+# The names are those of the built module: tests/python/bindings/test_stub.py compares the two.
 """The native part of Risorius: DNA files and rig evaluation."""
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ import bpy
 from ...logic.base.sentences import told
 from .blender_types import Animated, NodeTree
 
-NEWEST_TRIED = (5, 2)  # of Blender, by packaging/matrix.sh
+NEWEST_TRIED = (5, 2)  # of Blender, by packaging/check/blender/matrix.sh
 
 
 def notice() -> str:

@@ -3,7 +3,7 @@
 
 The faces and the values beside them (golden/) are synthetic and come from OpenRigLogic, an
 independent implementation (tests/data/golden/README.md of the project). What is compared was chosen
-by tests/python/make_selftest.py.
+by tests/python/support/make_selftest.py.
 """
 
 from __future__ import annotations

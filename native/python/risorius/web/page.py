@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The page: the empty one that comes with the package, and a face put into it.
 
-packaging/web.sh makes the empty page: the C library as WebAssembly, the viewer and three.js.
+packaging/ship/web.sh makes the empty page: the C library as WebAssembly, the viewer and three.js.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def empty_page() -> str:
     place = resources.files(__package__).joinpath(_EMPTY)
     if not place.is_file():
         raise WebError(
-            "this build of Risorius has no web page in it: packaging/web.sh makes it, and the "
+            "this build of Risorius has no web page in it: packaging/ship/web.sh makes it, and the "
             "next wheel that is built has it"
         )
     return place.read_text(encoding="utf-8")

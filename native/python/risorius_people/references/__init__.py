@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The joints that all sample people share, found on the man once: joints.npz, made by
-packaging/find_joints.py, has those of the people as they come; others are kept among the
+packaging/ship/find_joints.py, has those of the people as they come; others are kept among the
 user's caches."""
 
 from __future__ import annotations

@@ -1,0 +1,85 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Makes real Blender programs in chroots, for packaging/check/blender/matrix.sh: trixie's Blender 4.3.2 (Python
+# 3.13) and sid's, which moves (Blender 5.2.2 LTS with Python 3.14 when this was written). Needs root
+# and debootstrap on Debian; 3 minutes each on a quiet machine, 18 on two busy cores; 1.5 GB each.
+# Not part of the default tests.
+#
+#   ./packaging/check/blender/blenders.sh [trixie|sid|all] [PREFIX]
+#       makes PREFIX-trixie, PREFIX-sid or both and prints, one a line, the paths of programs to use
+#       as BLENDER=...; puts a wheel for each one's Python into build/dist, which the extension's
+#       zip then holds too. Default: trixie, /opt/risorius-blender
+set -euo pipefail
+suites=${1:-trixie}
+prefix=${2:-/opt/risorius-blender}
+case $suites in
+  all) suites="trixie sid" ;;
+  trixie | sid) ;;
+  *) echo "blenders.sh: $suites is none of trixie, sid, all" >&2 && exit 2 ;;
+esac
+if ! command -v debootstrap > /dev/null; then
+  echo "blenders.sh: debootstrap is not installed: apt-get install debootstrap (as root)" >&2
+  exit 1
+fi
+source "$(dirname "$0")/../../setup.sh"
+make_venv >&2
+
+make_system() { # make_system SUITE ROOT
+  local uri
+  uri=$(mirror)
+  if [ ! -e "$2/.risorius-made" ]; then
+    [ -x "$2/usr/bin/apt-get" ] || debootstrap --variant=minbase "$1" "$2" $uri
+    touch "$2/.risorius-made"
+  fi
+  mountpoint -q "$2/proc" || mount -t proc proc "$2/proc"
+  mountpoint -q "$2/dev" || mount --bind /dev "$2/dev"
+  # The project may lie below /tmp, so /tmp goes first.
+  for folder in /tmp "$project"; do
+    mkdir -p "$2$folder"
+    [ "$folder" -ef "$2$folder" ] || mount --bind "$folder" "$2$folder"
+  done
+}
+
+install_blender() { # install_blender SUITE ROOT
+  local more=
+  [ -x "$2/usr/bin/blender" ] && return 0
+  # sid's Blender needs these for its extensions and asset libraries and does not say so.
+  [ "$1" = sid ] && more="python3-cattr python3-requests"
+  # A mirror that is a dated snapshot calls itself out of date.
+  chroot "$2" sh -ec "export DEBIAN_FRONTEND=noninteractive
+    apt-get -o Acquire::Check-Valid-Until=false update -qq
+    apt-get install -y -qq --no-install-recommends blender python3-dev python3-numpy $more \
+      python3-venv python3-pip python3-pytest g++ cmake ninja-build nlohmann-json3-dev libxxhash-dev libeigen3-dev \
+      ca-certificates xvfb imagemagick libgl1-mesa-dri libegl1 libegl-mesa0"
+}
+
+build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetched where pip is set up
+  local tools="$project/build/tools" tag
+  "$python" -m pip download -q -d "$tools" scikit-build-core pybind11
+  tag=$(chroot "$1" python3 -c 'import sys; print("cp%d%d" % sys.version_info[:2])')
+  rm -f "$project"/build/dist/risorius-*-"$tag"-*.whl
+  # Sources of PyPI that native/ compiles, too: the first wheel of this machine has fetched them.
+  [ -e "$project/build/third_party/meshoptimizer/simplifier.cpp" ] || build_wheel >&2
+  chroot "$1" sh -ec "
+    [ -e /opt/risorius-venv/bin/pip ] || python3 -m venv /opt/risorius-venv
+    /opt/risorius-venv/bin/pip install -q --no-index --find-links '$tools' scikit-build-core pybind11
+    cd '$project' && PATH=/opt/risorius-venv/bin:/usr/bin:/bin /opt/risorius-venv/bin/pip wheel -q \
+      --no-build-isolation --no-deps --no-index -w build/dist ."
+}
+
+write_launcher() { # write_launcher ROOT: a program that runs as if Blender were installed here
+  cat > "$1/blender.sh" << END
+#!/bin/sh
+exec chroot "$1" /usr/bin/env -C "\$PWD" /usr/bin/blender "\$@"
+END
+  chmod +x "$1/blender.sh"
+}
+
+for suite in $suites; do
+  root=$prefix-$suite
+  make_system "$suite" "$root" >&2
+  install_blender "$suite" "$root" >&2
+  build_wheel_in "$root" >&2
+  write_launcher "$root"
+  echo "$root/blender.sh"
+done

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# official_blender.sh: official_blender.py, after the libraries that Blender's program needs on a bare Debian.
+# On other systems Blender brings what it needs; a Python 3.11 or newer must be there.
+#
+#   official_blender.sh VERSION EXTENSIONS [--program PROGRAM] [-- PYTEST ARGUMENTS]
+set -euo pipefail
+source "$(dirname "$0")/../../setup.sh"
+if [ "$(uname -s)" = Linux ] && [ "$(id -u)" = 0 ]; then
+  install_packages python3-pip ca-certificates
+fi
+run=python3
+command -v $run > /dev/null || run=python # Windows
+exec $run "$project/packaging/check/blender/official_blender.py" "$@"

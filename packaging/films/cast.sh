@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# The six sample people, each at three levels of detail, by one action: builds them, keys the demo's
+# acting on the first, and gives all others that very action. Leaves a film in build/cast.
+set -euo pipefail
+source "$(dirname "$0")/film.sh"
+
+begin_film cast
+step "six people"
+faces=()
+for person in man woman girl lady fighter elder; do
+  faces+=("$out/$person.dna")
+  [ -e "$out/$person.dna" ] || "$venv/bin/risorius" sample build --person "$person" \
+    --texture-size 512 "$out/$person.dna"
+done
+step "Blender: one action on eighteen faces"
+fresh_blender
+shown "$out/blender.log" limited 28800 "$python" "$project/packaging/films/cast.py" -- \
+  --extension "$zip" --out "$out" --face "${faces[@]}"
+step "film"
+rate=12 crf=26 end_film 1 cast.mp4
+tell cast.mp4 cast.blend

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: MIT
+"""Makes the Blender extension: the add-on with wheels of the native module inside.
+
+    build_extension.py --wheels WHEEL [WHEEL ...] --out FOLDER [--sample FOLDER]
+
+Prints the path of the zip. The wheels' version must equal the add-on's. The wheel of the sample
+people is taken from beside the first wheel. The pure wheels that extension_wheels.txt pins are
+fetched with pip, their hashes checked, and kept in OUT/pure. Equal files make an equal zip,
+whenever it is made.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+ADDON = Path(__file__).resolve().parents[2] / "addon" / "risorius"
+PINNED = Path(__file__).with_name("extension_wheels.txt")
+SAMPLE = Path(__file__).with_name("sample")  # licence and origin of the sample face
+PLATFORMS = {
+    r"(many)?linux.*_x86_64": "linux-x64",
+    r"win_amd64": "windows-x64",
+    r"win_arm64": "windows-arm64",
+    r"macosx_.*_arm64": "macos-arm64",
+    r"macosx_.*_x86_64": "macos-x64",
+}
+DATE = (2026, 1, 1, 0, 0, 0)  # of every file in a zip, so that equal files make an equal zip
+
+
+def manifest_version(text: str) -> str:
+    found = re.search(r'^version = "([^"]+)"', text, re.MULTILINE)
+    if not found:
+        raise SystemExit("blender_manifest.toml has no version")
+    return found.group(1)
+
+
+def platform_of(wheel: Path) -> str:
+    tag = wheel.stem.rsplit("-", 1)[-1]
+    # One wheel may name several systems: manylinux_2_27_x86_64.manylinux_2_28_x86_64.
+    for pattern, platform in PLATFORMS.items():
+        if re.fullmatch(pattern, tag.split(".")[0]):
+            return platform
+    raise SystemExit(f"{wheel.name}: no Blender platform for {tag}")
+
+
+def name_inside(wheel: Path) -> str:
+    """The wheel's file name in the zip: with a build number, unless it is for Python 3.11.
+
+    Blender takes the wheels of its own Python. Only 4.2.0, which is Python 3.11, looked at the
+    platform alone and then kept the wheel whose name sorts last: a number sorts before `cp311`.
+    """
+    parts = wheel.name.split("-")
+    if len(parts) == 5 and parts[2] != "cp311":
+        parts.insert(2, "1")
+    return "-".join(parts)
+
+
+def fetch_pinned(folder: Path) -> list[Path]:
+    """The wheels of extension_wheels.txt, from the folder where they are there, else from PyPI.
+
+    Raises SystemExit where they cannot be had, or are not those that were pinned.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    pip = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary", ":all:"]
+    pip += ["--require-hashes", "-r", str(PINNED), "-d", str(folder)]
+    local = [*pip, "--no-index", "--find-links", str(folder)]
+    if subprocess.run(local, capture_output=True, check=False).returncode:
+        done = subprocess.run(pip, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise SystemExit(f"the wheels of {PINNED.name} cannot be had: {done.stderr.strip()}")
+    names = re.findall(r"^([\w-]+)==([\w.]+)", PINNED.read_text(encoding="utf-8"), re.MULTILINE)
+    found = (folder.glob(f"{name.replace('-', '_')}-{version}-*.whl") for name, version in names)
+    return [wheel for wheels in found for wheel in wheels]
+
+
+def people_wheel(wheels: list[Path]) -> Path:
+    """The wheel of the sample people that lies beside wheels of ours.
+
+    Args:
+        wheels: of ours, all of one version.
+
+    Raises:
+        SystemExit: it is not there.
+    """
+    version = wheels[0].name.split("-")[1]
+    found = wheels[0].with_name(f"risorius_people-{version}-py3-none-any.whl")
+    if not found.is_file():
+        raise SystemExit(f"{found} was expected: build it with build_people_wheel of setup.sh")
+    return found
+
+
+def copy_sample(sample: Path, target: Path) -> None:
+    """The sample face with its textures, its licence and its origin beside it.
+
+    Args:
+        sample: a folder with what `risorius sample build` wrote.
+        target: a folder that is not there yet.
+    """
+    shutil.copytree(sample, target, ignore=shutil.ignore_patterns(".*"))
+    for path in sorted(SAMPLE.iterdir()):
+        shutil.copy(path, target)
+
+
+def write_zip(root: Path, target: Path) -> None:
+    """All files below a folder as a zip that depends on nothing but them.
+
+    Args:
+        root: the folder.
+        target: the zip.
+    """
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(root.rglob("*")):
+            if path.is_file():
+                about = zipfile.ZipInfo(path.relative_to(root).as_posix(), DATE)
+                about.compress_type = zipfile.ZIP_DEFLATED
+                about.external_attr = 0o644 << 16
+                archive.writestr(about, path.read_bytes())
+
+
+def make_tree(
+    wheels: list[Path], root: Path, pure: list[Path], sample: Path | None, website: str = ""
+) -> str:
+    """The extension as a folder, as Blender's own tools take it; gives its version.
+
+    Args:
+        wheels: of ours, one for each Python and platform.
+        root: a folder that is not there yet.
+        pure: wheels for every Python and platform, taken as they are.
+        sample: a folder with the sample face, or None.
+        website: address of the documentation, where there is one.
+
+    Raises:
+        SystemExit: something does not fit together; a sentence says what.
+    """
+    text = (ADDON / "blender_manifest.toml").read_text(encoding="utf-8")
+    version = manifest_version(text)
+    for wheel in wheels:
+        if wheel.name.split("-")[1] != version:
+            raise SystemExit(f"{wheel.name} is not version {version}, the add-on is")
+    inside = [*map(name_inside, sorted(wheels)), *(w.name for w in sorted(pure))]
+    names = ", ".join(f'"./wheels/{name}"' for name in inside)
+    platforms = ", ".join(f'"{p}"' for p in sorted({platform_of(w) for w in wheels}))
+    head, mark, tail = text.partition("\n[permissions]")
+    head += f'\nwebsite = "{website}"' if website else ""
+    text = f"{head}\nplatforms = [{platforms}]\nwheels = [{names}]\n{mark}{tail}"
+    ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
+    shutil.copytree(ADDON, root, ignore=ignored)
+    (root / "blender_manifest.toml").write_text(text, encoding="utf-8")
+    (root / "wheels").mkdir()
+    for wheel in wheels:
+        shutil.copy(wheel, root / "wheels" / name_inside(wheel))
+    for wheel in pure:
+        shutil.copy(wheel, root / "wheels")
+    if sample is not None:
+        copy_sample(sample, root / "sample")
+    return version
+
+
+def build(
+    wheels: list[Path], out: Path, pure: list[Path] | None = None, sample: Path | None = None
+) -> Path:
+    """Write the zip with all wheels, into `out`; the rest is as make_tree takes and raises it."""
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder) / "risorius"
+        version = make_tree(wheels, root, pure or [], sample)
+        target = out / f"risorius-{version}.zip"
+        write_zip(root, target)
+    return target
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--wheels", nargs="+", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--sample", type=Path, help="folder with the sample face")
+    args = parser.parse_args()
+    pure = [people_wheel(args.wheels), *fetch_pinned(args.out / "pure")]
+    print(build(args.wheels, args.out, pure, args.sample))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: MIT
+"""The pages of the site: those that are written, at their places in the project, and those of code.
+
+gather.py PAGES CLASSES.json    PAGES: a folder, emptied first; CLASSES.json: of blender_classes.py
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+import shutil
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+PROJECT = Path(__file__).resolve().parents[3]
+LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
+FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
+
+
+def listed(nav: str) -> list[str]:
+    """Pages of the project that the navigation names, from the text of mkdocs.yml."""
+    names = re.findall(r"- ([\w./]+\.md)$", nav, re.MULTILINE)
+    return [n for n in names if n != "index.md" and not n.startswith("reference/")]
+
+
+def copy_page(name: str, pages: Path) -> set[str]:
+    """Copy a page, and what it shows or links to in the project.
+
+    A link to a folder, or to a page that the site does not have, becomes plain text.
+
+    Args:
+        name: of the page, from the project's folder.
+        pages: the site's folder.
+
+    Returns:
+        Names of files that it links to.
+    """
+    source, linked = PROJECT / name, set()
+
+    def other(match: re.Match[str]) -> str:
+        target = match.group(1)
+        if "://" in target or target.startswith("mailto:"):
+            return match.group(0)
+        path = (source.parent / target).resolve()
+        if path.is_file() and path.is_relative_to(PROJECT):
+            linked.add(path.relative_to(PROJECT).as_posix())
+            return match.group(0)
+        return f"]({place_of(path)})"
+
+    def place_of(path: Path) -> str:
+        inside = path / "README.md"
+        if inside.is_file():
+            linked.add(inside.relative_to(PROJECT).as_posix())
+            up = "../" * len(Path(name).parent.parts)
+            return f"{up}{inside.relative_to(PROJECT).as_posix()}"
+        raise SystemExit(f"{name} links to {path}, which is not there.")
+
+    text = LINK.sub(other, source.read_text(encoding="utf-8"))
+    target = pages / name
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text, encoding="utf-8")
+    return linked
+
+
+def copy_pages(pages: Path, names: Iterable[str]) -> None:
+    """Copy pages and, again and again, what they link to."""
+    wanted, done = set(names), set()
+    while wanted - done:
+        name = min(wanted - done)
+        done.add(name)
+        if name.endswith(".md"):
+            wanted |= copy_page(name, pages)
+        else:
+            (pages / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(PROJECT / name, pages / name)
+
+
+def commands() -> str:
+    """The command line, from what each command says with --help."""
+    from risorius import cli
+
+    def said(*words: str) -> str:
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
+            cli.parse([*words, "--help"])
+        return out.getvalue()
+
+    def kinds(text: str) -> list[str]:
+        found = re.search(r"^\s+\{([\w,]+)\}", text, re.MULTILINE)
+        return found.group(1).split(",") if found else []
+
+    parts = ["# Commands\n\nWhat each command says with `--help`.\n"]
+    stack = [[name] for name in kinds(said())]
+    while stack:
+        words = stack.pop(0)
+        text = said(*words)
+        inner = [[*words, name] for name in kinds(text)] if len(words) == 1 else []
+        stack = inner + stack
+        parts.append(
+            f"{'#' * (1 + len(words))} risorius {' '.join(words)}\n\n"
+            f"```text\n{text.rstrip()}\n```\n"
+        )
+    return "\n".join(parts)
+
+
+def python_item(module: ModuleType, name: str) -> str:
+    """The entry of a public name: of a class or function where it is defined, of a value its value.
+
+    Args:
+        module: that gives it.
+        name: of it.
+    """
+    item = getattr(module, name)
+    if hasattr(item, "__qualname__"):
+        return f"::: {item.__module__}.{item.__qualname__}\n"
+    return f"### {module.__name__}.{name}\n\n`{str(item)[:200]}`\n"
+
+
+def python_api() -> str:
+    """What `import risorius` gives, and the modules that are used by name."""
+    import risorius
+
+    parts = [
+        "# Python\n\nWhat `import risorius` gives; then modules that are imported by name.\n\n"
+        "## risorius\n"
+    ]
+    parts += [f"::: risorius.{name}\n" for name in risorius.__all__]
+    for name in ("importing", "live", "speech", "baking", "batch", "sample", "selftest"):
+        module = __import__(f"risorius.{name}", fromlist=["__all__"])
+        parts.append(f"## risorius.{name}\n\n{(module.__doc__ or '').strip()}\n")
+        parts += [python_item(module, item) for item in getattr(module, "__all__", ())]
+    return "\n".join(parts)
+
+
+def cpp_api() -> str:
+    """The headers of the libraries, folder by folder, with the comment that each begins with."""
+    parts = [
+        "# C++\n\nThe headers themselves, from the ground up; what a folder is for: "
+        "[native](../native/README.md).\n"
+    ]
+    folders = "core dna dna/file dna/convert rig compile edit clip clip/file clip/mixer api".split()
+    for folder in folders:
+        headers = sorted((PROJECT / "native" / folder).glob("*.h"))
+        if headers:
+            parts.append(f"## native/{folder}\n")
+        for header in headers:
+            text = header.read_text(encoding="utf-8").replace(
+                "// SPDX-License-Identifier: MIT\n", ""
+            )
+            parts.append(f"### {folder}/{header.name}\n\n```cpp\n{text.strip()}\n```\n")
+    return "\n".join(parts)
+
+
+def cell(text: str) -> str:
+    """Text of a table's cell."""
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def blender_page(row: dict[str, Any]) -> str:
+    """The page of a panel or operator.
+
+    Args:
+        row: of blender_classes.py.
+    """
+    lines = [f"# {row['label'] or row['id']}", ""]
+    if row["description"]:
+        lines += [row["description"].rstrip(".") + ".", ""]
+    if row["kind"] == "operator":
+        lines += [f"In Python: `bpy.ops.{row['id']}()`", ""]
+    else:
+        where = (
+            f"below *{row['parent']}*"
+            if row["parent"]
+            else "in the sidebar of the 3D view, tab *Risorius*"
+        )
+        lines += [f"Where: {where}.", ""]
+    if row["buttons"]:
+        lines += ["Buttons: " + ", ".join(row["buttons"]) + ".", ""]
+    if row["properties"]:
+        lines += ["| Option | Name in Python | Default | What it does |", "|---|---|---|---|"]
+        for one in row["properties"]:
+            words = [
+                one["label"],
+                f"`{one['id']}`",
+                f"`{one['default']}`" if one["default"] else "",
+                one["description"],
+            ]
+            lines.append("| " + " | ".join(cell(word) for word in words) + " |")
+        for one in row["properties"]:
+            for item in one["items"]:
+                lines += [
+                    "",
+                    f"- *{one['label']}: {item[1]}* (`{item[0]}`)"
+                    + (f": {item[2]}" if item[2] else ""),
+                ]
+    return "\n".join(lines) + "\n"
+
+
+def blender_pages(
+    pages: Path, rows: list[dict[str, Any]]
+) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Write the pages of panels and operators; gives (heading, (title, file) of each)."""
+    folder = pages / "reference" / "blender"
+    folder.mkdir(parents=True)
+    nav = []
+    index = ["# Panels and operators", "", "Made from the classes that the add-on registers.", ""]
+    for kind, heading in (("panel", "Panels"), ("operator", "Operators")):
+        index += [f"## {heading}", "", "| Name | What it does |", "|---|---|"]
+        mine = sorted((r for r in rows if r["kind"] == kind), key=lambda r: (r["label"], r["id"]))
+        group = []
+        for row in mine:
+            name = f"{row['id']}.md"
+            (folder / name).write_text(blender_page(row), encoding="utf-8")
+            words = row["description"] or ", ".join(row["buttons"])
+            index.append(f"| [{row['label'] or row['id']}]({name}) | {cell(words)} |")
+            group.append((row["label"] or row["id"], f"reference/blender/{name}"))
+        index.append("")
+        nav.append((heading, group))
+    (folder / "index.md").write_text("\n".join(index), encoding="utf-8")
+    return nav
+
+
+def write_nav(text: str, nav: list[tuple[str, list[tuple[str, str]]]]) -> str:
+    """mkdocs.yml with the pages of panels and operators in its navigation."""
+    lines = ["      - reference/blender/index.md"]
+    for heading, group in nav:
+        lines.append(f"      - {heading}:")
+        lines += [f"          - {json.dumps(title)}: {name}" for title, name in group]
+    mark = ": reference/blender/\n"
+    return text.replace(mark, ":\n" + "\n".join(lines) + "\n")
+
+
+def main() -> int:
+    """Gather everything; prints how many pages there are."""
+    pages, classes = Path(sys.argv[1]), Path(sys.argv[2])
+    shutil.rmtree(pages, ignore_errors=True)
+    pages.mkdir(parents=True)
+    own = Path(__file__).parent
+    text = (own / "mkdocs.yml").read_text(encoding="utf-8")
+    shutil.copy(own / "index.md", pages / "index.md")
+    copy_pages(pages, [*listed(text), "docs/images/first_look.jpg"])
+    nav = blender_pages(pages, json.loads(classes.read_text(encoding="utf-8")))
+    for name, content in (("commands", commands()), ("python", python_api()), ("cpp", cpp_api())):
+        (pages / "reference" / f"{name}.md").write_text(content, encoding="utf-8")
+    more = sorted(
+        p.relative_to(pages).as_posix() for p in pages.rglob("*.md")
+        if p.relative_to(pages).as_posix() not in text and "reference/blender" not in p.as_posix()
+    )  # fmt: skip
+    if more:  # pages that others link to
+        text = text.rstrip("\n") + "\n" + "\n".join(f"      - {name}" for name in more) + "\n"
+    text = (
+        write_nav(text, nav)
+        .replace("../../../build/site/", "")
+        .replace("../../../native", str(PROJECT / "native"))
+    )
+    (pages.parent / "mkdocs.yml").write_text(text, encoding="utf-8")
+    print(f"{len(list(pages.rglob('*.md')))} pages")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

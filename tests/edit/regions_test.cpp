@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// Which joints come together.
+#include "edit/regrouped.h"
+
+namespace risorius::edit {
+namespace {
+
+using namespace regrouping;
+
+// Two halves of the joints, each by a control of its own. The other half's control moves each fifth
+// a little, which shows no kinship as long as what is small is left out of the search.
+TEST(Regroup, FindsRegionsByWhatIsNotSmall) {
+  constexpr std::uint16_t kHalf = 40;
+  dna::Dna dna = make_face(2, 0, 2 * kHalf);
+  Indices outputs;
+  std::vector<float> values;
+  std::vector<Indices> halves(2);
+  for (std::uint16_t j = 0; j < 2 * kHalf; ++j) {
+    outputs.push_back(static_cast<std::uint16_t>(j * 9));
+    const float small = j % 5 == 0 ? 0.04f : 0.0f;
+    values.insert(values.end(), {j < kHalf ? 1.0f : small, j < kHalf ? small : 1.0f});
+    halves[j / kHalf].push_back(j);
+  }
+  dna.behavior.joint_groups =
+      std::vector{make_group({2 * kHalf, 2 * kHalf}, {0, 1}, outputs, values)};
+  RegroupOptions options;
+  options.threshold.translation_mm = 0.5;
+  const Regrouped out = must_regroup(dna, options);
+  EXPECT_EQ(out.report.regions, halves);
+  EXPECT_EQ(out.report.removed, 2u * kHalf / 5);
+}
+
+}  // namespace
+}  // namespace risorius::edit

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""The tables of the READMEs that say what lies where, and what does lie there.
+
+A map is a table of a page; the first column of its rows has names in backquotes. `Map.wrong` says
+in sentences which names of the table are nowhere, and which the table lacks.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+_UNNAMED = {"README.md", "__init__.py", "CMakeLists.txt"}
+
+
+def first_cells(text: str, head: str) -> list[str]:
+    """The names in backquotes in the first column of the table whose head begins with a text.
+
+    Args:
+        text: of the page, as Markdown.
+        head: how the first cell of the table's head begins.
+
+    Returns:
+        The names without options and without words that follow them; none without such a table.
+    """
+    found = re.search(rf"^\| {re.escape(head)}[^\n]*\n\|[-|]+\n((?:\|.*\n)+)", text, re.MULTILINE)
+    cells = [row.split("|")[1] for row in found[1].splitlines()] if found else []
+    names = [name.split()[0] for cell in cells for name in re.findall(r"`([^`]+)`", cell)]
+    return [name for name in names if not name.startswith("-")]
+
+
+def folders(path: Path) -> list[str]:
+    """The names of the folders in a folder that hold a file, but for those that Python makes."""
+    inside = (p for p in path.iterdir() if p.is_dir() and p.name != "__pycache__")
+    return [p.name for p in inside if any(f.is_file() and f.suffix != ".pyc" for f in p.rglob("*"))]
+
+
+def files(path: Path) -> list[str]:
+    """The names of the files in a folder, but for its README.md and what marks a package."""
+    return [p.name for p in path.iterdir() if p.is_file() and p.name not in _UNNAMED]
+
+
+@dataclass(frozen=True)
+class Map:
+    """A table: its page, its head, the names that are there, and the places where they lie.
+
+    `there` are the names that the table must have; each name that it has must be a path below one
+    of `places`.
+    """
+
+    page: str
+    head: str
+    there: tuple[str, ...]
+    places: tuple[str, ...]
+
+    def wrong(self, text: str) -> list[str]:
+        """A sentence for each name that is missing in the table, or on the disk."""
+        named = [name.rstrip("/") for name in first_cells(text, self.head)]
+        where = f"{self.page}, table {self.head}"
+        lost = [n for n in named if not any((ROOT / place / n).exists() for place in self.places)]
+        return [f"{where}: {name} is nowhere" for name in lost] + [
+            f"{where}: {name} is missing" for name in sorted(set(self.there) - set(named))
+        ]
+
+
+def _all(*names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted({name for group in names for name in group}))
+
+
+def maps() -> list[Map]:
+    """The maps of the project, with what lies there now."""
+    at = ROOT.joinpath
+    native = [f"native/{name}" for name in folders(at("native"))]
+    others = ["addon/risorius", "tests", "blender_tests", "packaging", "docs"]
+    package = "native/python/risorius"
+    python = "tests/python"
+    scene = "addon/risorius/scene"
+    of_blender = [n for n in folders(at("blender_tests")) if n not in ("support", "data")]
+    found = [
+        Map("docs/development.md", "folder", _all(native, others), ("",)),
+        Map("tests/README.md", "Folder |", _all(folders(at("tests"))), ("tests",)),
+        Map("tests/README.md", "Folder of `python`", _all(folders(at(python))), (python,)),
+        Map("blender_tests/README.md", "Folder of tests", _all(of_blender), ("blender_tests",)),
+        Map("addon/README.md", "room of `scene`", _all(folders(at(scene))), (scene,)),
+        Map("native/python/README.md", "room", _all(folders(at(package))), (package,)),
+    ]
+    for place in ("films", "check", "check/blender", "ship", "ship/cross"):
+        inside = files(at("packaging", place))
+        found.append(
+            Map("packaging/README.md", f"`{place}/`", _all(inside), (f"packaging/{place}",))
+        )
+    top = files(at("packaging"))
+    return [*found, Map("packaging/README.md", "At the top", _all(top), ("packaging",))]

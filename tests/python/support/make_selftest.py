@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: MIT
+"""Chooses what the self-test of the wheel compares with, from the values of tests/data/golden.
+
+    python tests/python/support/make_selftest.py
+
+Takes each face of COMES_FROM and the reference's values for some of its cases at every LOD. A
+case that the reference is known to evaluate differently (test_rig_behavior.py says which and why)
+is left out; how many are is printed, so that a mistake of ours would show as a number that grew.
+"""
+
+import hashlib
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "rigs"))
+
+import risorius
+from risorius.selftest import checks
+from test_rig_golden import Golden, raw_of_case
+
+PROJECT = Path(__file__).resolve().parents[3]
+SOURCE = PROJECT / "tests" / "data" / "golden"
+TARGET = PROJECT / "native" / "python" / "risorius" / "selftest" / "golden"
+COMES_FROM = {"core": "core", "units": "units", "solvers": "tiny_v28"}
+CASES = 12  # of each face, spread over those that there are
+
+
+def rows_of(name):
+    """(lod, raw, joints, shapes, maps) of the cases, and how many cases are left out."""
+    dna = risorius.load(SOURCE / f"{name}.dna")
+    rig = risorius.Rig(dna, simd="scalar")
+    golden = Golden(SOURCE, name)
+    cases = [c for c in golden.about["cases"] if c["kind"] != "gui"]
+    out, left = [], 0
+    for case in cases[:: max(1, len(cases) // CASES)]:
+        raw = raw_of_case(golden, rig, case)
+        for lod, offset in enumerate(case["lodRecordOffsets"]):
+            found = golden.record(offset)
+            values = [found["joints"], found["blendShapes"], found["animatedMaps"]]
+            row = checks._Case(lod, raw, *values)
+            if checks._error(row, rig) > checks.TOLERANCE / 4:
+                left += 1
+                continue
+            out.append(np.concatenate([[lod], raw, *values]).astype("<f4"))
+    return np.array(out), left
+
+
+def main():
+    TARGET.mkdir(exist_ok=True)
+    checks.content = lambda name: (TARGET / name).read_bytes()  # not those of the installed wheel
+    for name, source in COMES_FROM.items():
+        rows, left = rows_of(source)
+        (TARGET / f"{name}.dna").write_bytes((SOURCE / f"{source}.dna").read_bytes())
+        (TARGET / f"{name}.f32").write_bytes(rows.tobytes())
+        print(f"{name}: {len(rows)} poses, {left} left out, {rows.nbytes} bytes")
+    (TARGET / "scalar.sha256").write_text(checks.scalar_hash() + "\n")
+    size = sum(p.stat().st_size for p in TARGET.iterdir())
+    whole = hashlib.sha256(b"".join(p.read_bytes() for p in sorted(TARGET.iterdir())))
+    print(f"{size} bytes in all, {whole.hexdigest()[:16]}")
+
+
+if __name__ == "__main__":
+    main()
