@@ -144,7 +144,12 @@ def _read_by_solvers(dna: Dna) -> set[int]:
 
 
 def turn_axes(dna: Dna, joint: int) -> Doubles:
-    """The axes of a joint, float64[3, 3], see JointControl.axes."""
+    """The axes of a joint, float64[3, 3], see JointControl.axes.
+
+    Args:
+        dna: the face.
+        joint: its index.
+    """
     convention, parents = Convention.of(dna), dna.joint_parents
     chain = [joint]
     while int(parents[chain[-1]]) != chain[-1] and len(chain) <= len(parents):

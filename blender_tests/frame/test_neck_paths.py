@@ -20,7 +20,7 @@ from risorius.web import page as pages
 from support import oracle, probe, scene
 from support.faces import neck_face
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "python" / "support"))
 behavior, pose_oracle = (importlib.import_module(n) for n in ("oracle_behavior", "oracle"))
 
 NECK, HEAD = (0, 1), 2

@@ -177,7 +177,7 @@ def test_42_of_the_45_expressions_lie_within_a_millimetre_of_the_board() -> None
     Of each mesh that moves, tongue and teeth too: root of the mean square over its vertices that
     the expression moves by 0.1 mm.
     """
-    path = Path(__file__).parents[2] / "build" / "sample" / "man.dna"
+    path = Path(__file__).parents[3] / "build" / "sample" / "man.dna"
     if not path.is_file():
         _not_run.add("the extension's sample face")
         pytest.skip("extra not run: no extension was built here")

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 
 import pytest
 
-ADDON = Path(__file__).resolve().parents[2] / "addon" / "risorius"
+ADDON = Path(__file__).resolve().parents[3] / "addon" / "risorius"
 
 
 @pytest.fixture

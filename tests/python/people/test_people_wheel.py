@@ -11,7 +11,7 @@ import risorius_people
 from risorius import people, sample
 from risorius.cli import main
 
-PYTHON = Path(__file__).resolve().parents[2] / "native" / "python"
+PYTHON = Path(__file__).resolve().parents[3] / "native" / "python"
 
 
 def test_both_wheels_have_one_version():
