@@ -591,6 +591,10 @@ def test_a_new_board_lies_beside_the_face_in_the_view_and_in_the_hand(board_file
     assert both.min(axis=0)[1] >= 0.0
     assert both.max(axis=0)[0] <= window.width
     assert both.max(axis=0)[1] <= regions["TOOL_HEADER"].y - window.y
+    state = (*view.view_location, view.view_distance)
+    view.view_distance *= 3.0
+    assert bpy.ops.risorius.frame_board() == {"FINISHED"}
+    assert (*view.view_location, view.view_distance) == pytest.approx(state, rel=1e-4)
     filled = np.ptp(both, axis=0) / (window.width - tools.width, window.height - 26 * 2)
     assert filled.max() > 0.9
     bpy.ops.object.mode_set(mode="OBJECT")

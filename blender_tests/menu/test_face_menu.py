@@ -19,7 +19,7 @@ ELSEWHERE = {
     *("mix_add", "mix_add_scene", "mix_remove", "mix_preview", "mix_write"),
     *("forget_range", "load_range", "save_range", "add_character", "set_lod"),
     *("set_lod_by_distance", "set_shape_mode", "set_strands", "reset_board", "select_board"),
-    *("lead", "remove_board", "sound_set", "sound_insert", "sound_remove"),
+    *("lead", "remove_board", "frame_board", "sound_set", "sound_insert", "sound_remove"),
 }
 
 

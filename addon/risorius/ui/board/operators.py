@@ -161,6 +161,29 @@ def _take_up(context: Context, rig: ArmatureObject) -> None:
     framing.show_with_board(context, rig)
 
 
+class RISORIUS_OT_frame_board(FaceOperator, Operator):
+    """Show head and face board beside each other, from the front"""
+
+    bl_idname = "risorius.frame_board"
+    bl_label = "Frame Face and Board"
+    bl_options = {"REGISTER"}
+    whole_face = False
+    baked_too = True
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if not _has_board(context):
+            cls.poll_message_set(say("This face has no board: add one first."))
+            return False
+        return True
+
+    def execute(self, context: Context) -> Result:
+        framing.show_with_board(context, face_rig(context))
+        return {"FINISHED"}
+
+
 class RISORIUS_OT_remove_board(_OwnArmature, Operator):
     """Take the face board away; its pose goes to the sliders, keys stay in their actions"""
 
@@ -300,6 +323,7 @@ class RISORIUS_OT_select_board(FaceOperator, Operator):
 
 CLASSES = (
     RISORIUS_OT_add_board,
+    RISORIUS_OT_frame_board,
     RISORIUS_OT_remove_board,
     RISORIUS_OT_lead,
     RISORIUS_OT_reset_board,

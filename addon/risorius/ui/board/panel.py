@@ -70,6 +70,7 @@ class RISORIUS_PT_board(FaceOnlyPanel, Panel):
             button.selected = True
             row.operator("risorius.reset_board", text="Reset All").selected = False
         layout.operator_menu_enum("risorius.select_board", "region", icon="RESTRICT_SELECT_OFF")
+        layout.operator("risorius.frame_board", icon="ZOOM_SELECTED")
         draw_kinds(layout, live.board)
         layout.operator("risorius.remove_board", icon="TRASH")
 

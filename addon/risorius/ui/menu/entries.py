@@ -85,6 +85,7 @@ class RISORIUS_MT_face_board(Menu):
         layout.operator_menu_enum("risorius.lead", "by")
         layout.operator_menu_enum("risorius.select_board", "region", icon="RESTRICT_SELECT_OFF")
         layout.operator("risorius.reset_board", icon="LOOP_BACK").selected = False
+        layout.operator("risorius.frame_board", icon="ZOOM_SELECTED")
         layout.separator()
         layout.operator("risorius.remove_board", icon="TRASH")
 
