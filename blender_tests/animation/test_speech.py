@@ -285,60 +285,62 @@ def test_a_correction_is_undone_in_one_step_with_its_keys(rig):
 # ---- markers ----
 
 
+def marker(frame):
+    """The only marker at a frame."""
+    (found,) = [m for m in bpy.context.scene.timeline_markers if m.frame == frame]
+    return found
+
+
 def markers():
-    """Place and frame of the markers by their names; the user's own have no place."""
-    return sorted(
-        (m.frame, m.name) for m in bpy.context.scene.timeline_markers if "risorius_sound" in m
-    )
+    """Frame and name of all."""
+    return sorted((m.frame, m.name) for m in bpy.context.scene.timeline_markers)
 
 
-def test_markers_stand_for_sounds_and_a_moved_one_is_followed(rig, capfd):
-    own = bpy.context.scene.timeline_markers.new("mine", frame=20)
+def test_markers_stand_for_sounds_and_changed_ones_are_followed(rig, capfd):
+    own = bpy.context.scene.timeline_markers.new("mine", frame=21)
     action = speak()
     assert bpy.ops.risorius.speech_markers() == {"FINISHED"}
     shown = markers()
-    assert shown[6] == (25, "bob: M B P")
-    assert len(shown) == len(SAID)
-    by_place = {m.get("risorius_sound"): m for m in bpy.context.scene.timeline_markers}
-    by_place[7].frame = 27
-    by_place[8].name = "F V"
+    assert (25, "bob: M B P") in shown
+    assert len(shown) == len(SAID) + 1
+    own.frame = 22  # nobody's business
+    marker(28).frame = 27
+    marker(30).name = "F V"
     with pytest.raises(RuntimeError, match="choose Update Speech first"):
         bpy.ops.risorius.sound_remove()
     assert bpy.ops.risorius.speech_update() == {"FINISHED"}
     assert sounds(action)[7:9] == [(27.0, "AA", ""), (30.2, "F", "")]
-    assert (27, "Ah") in markers()
-    assert (30, "F V") in markers()
-    bpy.context.scene.timeline_markers.remove(
-        next(m for m in bpy.context.scene.timeline_markers if m.get("risorius_sound") == 7)
-    )
-    copy = bpy.context.scene.timeline_markers.new("Oo", frame=41)
-    copy["risorius_sound"], copy["risorius_voice"] = 12, action.risorius_spoken.mark
+    assert {(27, "Ah"), (30, "F V")} <= set(markers())
+    bpy.context.scene.timeline_markers.remove(marker(27))
+    bpy.context.scene.timeline_markers.new("Oo", frame=41)  # a copy of another one, or a new one
     assert bpy.ops.risorius.speech_update() == {"FINISHED"}
     assert [name for _, name, _ in sounds(action)] == (
         "SIL HH AH L OW SIL B F SIL W AY SIL UH".split()
     )
-    first = next(m for m in bpy.context.scene.timeline_markers if m.get("risorius_sound") == 1)
-    first.frame = 40  # past several
+    marker(13).frame = 45  # past all others
     capfd.readouterr()
     assert bpy.ops.risorius.speech_update() == {"FINISHED"}
     assert "hello: K G was moved past its neighbour" in capfd.readouterr().out
     assert sounds(action)[1] == (pytest.approx(15.55), "HH", "hello")
     assert bpy.ops.risorius.speech_markers() == {"FINISHED"}
-    assert markers() == []
-    assert (own.name, own.frame) == ("mine", 20)
+    assert markers() == [(22, "mine")]
 
 
 def test_markers_that_stand_for_no_sound_are_a_sentence(rig):
     action = speak()
     bpy.ops.risorius.speech_markers()
     before, there = sounds(action), bpy.context.scene.timeline_markers
-    there[3].name = "bob: hum"
+    marker(18).name = "bob: hum"
     with pytest.raises(RuntimeError, match="the marker bob: hum at frame 18: a mouth such as"):
         bpy.ops.risorius.speech_update()
-    for marker in list(there):
-        there.remove(marker)
-    assert bpy.ops.risorius.speech_update() == {"FINISHED"}  # nothing is shown: nothing to read
+    for one in list(there):
+        there.remove(one)
+    with pytest.raises(RuntimeError, match="no marker of this voice is left: show its markers"):
+        bpy.ops.risorius.speech_update()
     assert sounds(action) == before
+    bpy.context.scene["risorius_markers"] = "somebody wrote here"
+    assert bpy.ops.risorius.speech_markers() == {"FINISHED"}
+    assert len(markers()) == len(SAID)
 
 
 def test_markers_lie_where_a_layer_plays_the_voice(rig):
@@ -346,9 +348,7 @@ def test_markers_lie_where_a_layer_plays_the_voice(rig):
     (layer,) = scene.controls(rig).risorius_layers
     layer.start, layer.scale = 101.0, 2.0
     bpy.ops.risorius.speech_markers()
-    assert markers()[6][0] == round(101 + 2 * (25.4 - 11))
-    moved = next(m for m in bpy.context.scene.timeline_markers if m["risorius_sound"] == 6)
-    moved.frame = 126
+    marker(round(101 + 2 * (25.4 - 11))).frame = 126
     bpy.ops.risorius.speech_update()
     assert sounds(layer.action)[6][0] == 23.5
 

@@ -7,6 +7,7 @@ make a hole or an overlap.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -221,11 +222,9 @@ def respelled(
 
 
 class Mark(NamedTuple):
-    """A marker of a timeline that stands for a sound."""
+    """A marker of a timeline."""
 
-    place: int
-    """Of the sound that it was put up for."""
-    frame: float
+    frame: int
     """Of the scene."""
     name: str
 
@@ -240,9 +239,68 @@ def label_of(sound: Sound, mouth: str) -> str:
     return f"{sound.word}: {mouth}" if sound.word else mouth
 
 
+@dataclass(frozen=True)
+class Board:
+    """Markers of a scene while they stand for sounds.
+
+    Attributes:
+        placed: those that were put up, one a sound, as they were then.
+        own: the user's own of that moment.
+        there: all that are there now.
+    """
+
+    placed: Sequence[Mark]
+    own: Sequence[Mark]
+    there: Sequence[Mark]
+
+    def paired(self, named: Callable[[str], str | None]) -> tuple[dict[int, Mark], list[Mark]]:
+        """Which marker stands for which sound now. Markers carry nothing but frame and name.
+
+        One that is as it was stands for its sound; then one of another name at its frame (renamed),
+        one of its name at another frame (moved), and one called as a sound between its neighbours.
+
+        Args:
+            named: what somebody wrote -> phoneme, or None.
+
+        Returns:
+            Place in `placed` -> its marker; markers of sounds that come in addition. What is
+            neither is the user's own.
+        """
+        there, found = Counter(self.there), dict[int, Mark]()
+        for place, mark in enumerate(self.placed):  # most are as they were, and may be thousands
+            if there[mark]:
+                there[mark] -= 1
+                found[place] = mark
+        left = list((there - Counter(self.own)).elements())
+        self._match(found, left, lambda old, new: old.frame == new.frame)
+        self._match(found, left, lambda old, new: old.name == new.name)
+        left = [mark for mark in left if named(_mouth_of(mark.name)) and _mouth_of(mark.name)]
+        around = [mark.frame for mark in self.placed]
+        around = [around[:1] + around[:-1], around[1:] + around[-1:]]
+        between = {old: span for old, *span in zip(self.placed, *around, strict=True)}
+        self._match(found, left, lambda old, new: between[old][0] < new.frame < between[old][1])
+        return found, left
+
+    def _match(
+        self, found: dict[int, Mark], left: list[Mark], fits: Callable[[Mark, Mark], bool]
+    ) -> None:
+        for place, old in enumerate(self.placed):
+            if place in found:
+                continue
+            fitting = [mark for mark in left if fits(old, mark)]
+            if fitting:
+                found[place] = min(fitting, key=lambda mark: abs(mark.frame - old.frame))
+                left.remove(found[place])
+
+
+def _mouth_of(name: str) -> str:
+    """The mouth in a marker's name, behind the word."""
+    return name.rpartition(":")[2].strip()
+
+
 def from_marks(
     sounds: Sequence[Sound],
-    marks: Sequence[Mark],
+    board: Board,
     placing: Placing,
     end: float,
     label: Callable[[str], str],
@@ -252,7 +310,7 @@ def from_marks(
 
     Args:
         sounds: the list for which the markers were put up.
-        marks: those that are there now.
+        board: the markers.
         placing: where the list lies in the scene.
         end: of the list.
         label: phoneme -> what its mouth is called.
@@ -264,40 +322,35 @@ def from_marks(
     Raises:
         SpokenError: no marker is left, or one has a name that stands for no sound.
     """
-    by_place: dict[int, list[Mark]] = {}
-    for mark in marks:
-        if 0 <= mark.place < len(sounds):
-            by_place.setdefault(mark.place, []).append(mark)
-    if not by_place:
+    found, more = board.paired(named)
+    if not found or len(board.placed) != len(sounds):
         raise SpokenError(told("no marker of this voice is left: show its markers again"))
     wanted: dict[int, float] = {}
-    more: list[tuple[float, str]] = []
     out = list(sounds)
-    for place, there in by_place.items():
-        shown = round(placing.shown(sounds[place].begin))
-        there.sort(key=lambda mark: abs(mark.frame - shown))
-        for mark in there[1:]:  # copies
-            more.append((placing.own(mark.frame), _renamed(mark, out[place], label, named).name))
-        out[place] = _renamed(there[0], out[place], label, named)
-        if there[0].frame != shown:
-            wanted[place] = placing.own(there[0].frame)
+    for place, mark in found.items():
+        out[place] = _renamed(mark, board.placed[place], out[place], label, named)
+        if mark.frame != board.placed[place].frame:
+            wanted[place] = placing.own(mark.frame)
     out, held = moved(out, wanted, end)
-    gone = [i for i in range(len(sounds)) if i not in by_place]
-    out = removed(out, gone) if gone else out
-    for frame, name in more:
-        out = inserted(out, frame, name, end)
+    missing = [i for i in range(len(sounds)) if i not in found]
+    out = removed(out, missing) if missing else out
+    for mark in more:
+        out = inserted(out, placing.own(mark.frame), named(_mouth_of(mark.name)) or SILENCE, end)
     return out, held
 
 
 def _renamed(
     mark: Mark,
+    before: Mark,
     sound: Sound,
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> Sound:
     """The sound that a marker's name says. Raises: SpokenError."""
-    word, colon, mouth = mark.name.rpartition(":")
-    word, mouth = word.strip() if colon else sound.word, mouth.strip()
+    if mark.name == before.name:
+        return sound
+    word, colon, _ = mark.name.rpartition(":")
+    word, mouth = word.strip() if colon else sound.word, _mouth_of(mark.name)
     if mouth != label(sound.name):
         name = named(mouth)
         if name is None or not mouth:

@@ -8,16 +8,19 @@ action keeps; the user's own markers are never touched.
 
 from __future__ import annotations
 
+import json
+
 import bpy
 
 from ... import native
 from ...logic.animation import spoken
-from ...logic.animation.spoken import Mark, Placing
+from ...logic.animation.spoken import Board, Mark, Placing
 from ..base import parts, saved
 from . import spoken_keys, voices
 
-_PLACE = "risorius_sound"  # on a marker: the place of its sound in the list
-_VOICE = "risorius_voice"  # on the same: the mark of the voice
+# On a scene: which markers stand for which voice, and the user's own of then, as JSON. Markers
+# themselves hold nothing beside frame and name since Blender 5.
+_KEPT = "risorius_markers"
 
 
 def label(name: str) -> str:
@@ -32,24 +35,37 @@ def named(text: str) -> str | None:
     return found
 
 
-def _ours(
-    scene: bpy.types.Scene, action: bpy.types.Action | None
-) -> list[bpy.types.TimelineMarker]:
-    """The markers of a voice. Args: action  None for those of all voices."""
-    voice = spoken_keys.of(action).mark if action is not None else None
-    there = [(m, saved.text(m, _VOICE)) for m in scene.timeline_markers]
-    return [m for m, has in there if has and voice in (None, has)]
+def _board(scene: bpy.types.Scene) -> tuple[str, Board]:
+    """The mark of the voice whose markers a scene shows, "" where it shows none; the markers."""
+    there = [Mark(m.frame, m.name) for m in scene.timeline_markers]
+    try:
+        kept = json.loads(saved.text(scene, _KEPT) or "{}")
+        rows = ([Mark(int(f), str(n)) for f, n in kept.get(key, ())] for key in ("placed", "own"))
+        placed, own = rows
+        return str(kept.get("voice", "")), Board(placed, own, there)
+    except (ValueError, TypeError, AttributeError):
+        return "", Board([], [], there)  # somebody wrote into it
 
 
 def are_shown(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
     """Whether a voice has markers in a scene. Args: action  with the voice."""
-    return bool(_ours(scene, action))
+    voice = _board(scene)[0]
+    return bool(voice) and voice == spoken_keys.of(action).mark
 
 
 def hide(scene: bpy.types.Scene) -> None:
-    """Take the markers of all voices out of a scene; the user's own stay."""
-    for marker in _ours(scene, None):
-        scene.timeline_markers.remove(marker)
+    """Take the markers of a voice out of a scene; the user's own stay."""
+    voice, board = _board(scene)
+    if not voice:
+        return
+    found, more = board.paired(named)
+    ours = [*found.values(), *more]
+    for marker in list(scene.timeline_markers):
+        mark = Mark(marker.frame, marker.name)
+        if mark in ours:
+            ours.remove(mark)
+            scene.timeline_markers.remove(marker)
+    del scene[_KEPT]
 
 
 def show(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> None:
@@ -61,34 +77,29 @@ def show(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> 
         placing: where it lies in the scene.
     """
     hide(scene)
-    for place, (name, frame) in enumerate(_wanted(action, placing)):
-        marker = scene.timeline_markers.new(name, frame=frame)
-        marker[_PLACE], marker[_VOICE] = place, spoken_keys.of(action).mark
+    own = [(m.frame, m.name) for m in scene.timeline_markers]
+    placed = []
+    for sound in spoken_keys.sounds_of(action):
+        name = spoken.label_of(sound, label(sound.name))
+        marker = scene.timeline_markers.new(name, frame=round(placing.shown(sound.begin)))
         marker.select = False
+        placed.append((marker.frame, marker.name))  # Blender cuts long names
+    kept = {"voice": spoken_keys.of(action).mark, "placed": placed, "own": own}
+    scene[_KEPT] = json.dumps(kept)
 
 
-def _wanted(action: bpy.types.Action, placing: Placing) -> list[tuple[str, int]]:
-    return [
-        (spoken.label_of(sound, label(sound.name))[:63], round(placing.shown(sound.begin)))
-        for sound in spoken_keys.sounds_of(action)
-    ]
-
-
-def are_changed(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> bool:
+def are_changed(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
     """Whether somebody moved, renamed, copied or deleted markers of a voice that are shown.
 
     Args:
         scene: has the markers.
         action: with a voice.
-        placing: where it lies in the scene.
     """
-    wanted = [(i, *row) for i, row in enumerate(_wanted(action, placing))]
-    there = [(mark.place, mark.name, mark.frame) for mark in _marks(scene, action)]
-    return bool(there) and sorted(there) != wanted
-
-
-def _marks(scene: bpy.types.Scene, action: bpy.types.Action) -> list[Mark]:
-    return [Mark(saved.whole(m, _PLACE, -1), m.frame, m.name.strip()) for m in _ours(scene, action)]
+    if not are_shown(scene, action):
+        return False
+    board = _board(scene)[1]
+    found, more = board.paired(named)
+    return bool(more) or [found.get(i) for i in range(len(board.placed))] != list(board.placed)
 
 
 def take(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> list[str]:
@@ -106,9 +117,8 @@ def take(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> 
         SpokenError: no marker is left, or one is called what stands for no sound; nothing changes.
     """
     sounds = spoken_keys.sounds_of(action)
-    end = spoken_keys.of(action).end
-    found = _marks(scene, action)
-    new, held = spoken.from_marks(sounds, found, placing, end, label, named)
+    end, board = spoken_keys.of(action).end, _board(scene)[1]
+    new, held = spoken.from_marks(sounds, board, placing, end, label, named)
     spoken_keys.change(action, new)
     show(scene, action, placing)
     return [spoken.label_of(sounds[i], label(sounds[i].name)) for i in held]

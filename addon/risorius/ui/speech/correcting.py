@@ -34,8 +34,7 @@ def are_moved(context: Context, action: bpy.types.Action) -> bool:
         context: has the face and the scene.
         action: with the voice.
     """
-    placing = voices.placing(face_controls(context), action)
-    return spoken_markers.are_changed(context.scene, action, placing)
+    return spoken_markers.are_changed(context.scene, action)
 
 
 class _Corrects(FaceOperator):
