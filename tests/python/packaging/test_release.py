@@ -4,6 +4,7 @@
 import hashlib
 import importlib.util
 import json
+import re
 import subprocess
 import sys
 import tomllib
@@ -159,6 +160,16 @@ def test_the_sums_are_those_of_sha256sum(make, made):
     done = subprocess.run(command, cwd=folder / "out", capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert done.stdout.count(": OK") == 4
+
+
+def test_the_sbom_reads_versions_where_they_are_pinned():
+    # Its library is not among the tools of the tests.
+    text = (PROJECT / "packaging" / "ship" / "release" / "sbom.py").read_text(encoding="utf-8")
+    named = re.findall(r'pinned\("([\w-]+)", "([\w./]+)"\)', text)
+    assert len(named) == 3
+    for name, file in named:
+        lines = (PROJECT / "packaging" / file).read_text(encoding="utf-8").splitlines()
+        assert any(line.startswith(f"{name}==") for line in lines)
 
 
 def test_release_refuses_a_tree_that_it_cannot_be_made_of():
