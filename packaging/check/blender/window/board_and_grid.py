@@ -27,7 +27,7 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     told = f"{len(handles)} handles and the face are in the view, in pose mode"
     yield told, hand.ask("state")["mode"] == "POSE" and hand.ask("board_in_view", names=handles)
     hand.picture("board-added")
-    handle = next(name for name in handles if "jaw" in name.lower())
+    handle = next(name for name in handles if name.lower().split("_")[-1] == "jaw")
     before, box = hand.still(), hand.ask("face_box")
     at = hand.ask("bone_at", bone=handle)
     hand.click(*at)

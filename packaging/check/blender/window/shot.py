@@ -57,6 +57,7 @@ def shot(hand: Hand, _dna: Path) -> Iterator[Check]:
         go_to(hand, frame)
         expression(hand, name)
         key_all(hand)
+    scroll(hand)
     hand.picture("animator-expressions")
     go_to(hand, 170)
     hand.click(*hand.find(r"risorius\.reset\(", columns=(0.5, 0.45)))
