@@ -22,8 +22,9 @@ export class Joints {
     this.world = Array.from({ length: skeleton.count }, () => new Matrix4());
     this.skin = new Float32Array(12 * skeleton.count); // rows of 3x4 matrices
     this.parts = [new Vector3(), new Quaternion(), new Vector3(), new Quaternion()];
-    const rest = new Float32Array(skeleton.count * skeleton.stride);
-    this.place(rest);
+    this.turns = new Map(); // joint -> Quaternion about its own axes, see turn
+    this.rest = new Float32Array(skeleton.count * skeleton.stride);
+    this.place(this.rest);
     this.inverse = this.world.map((m) => m.clone().invert());
   }
 
@@ -43,19 +44,39 @@ export class Joints {
     return order;
   }
 
+  /** Turns of neck and head, which no pose has. In: [joint, [x, y, z, w]] against rest. */
+  turn(pairs) {
+    this.turns.clear();
+    for (const [joint, q] of pairs) {
+      if (q.some((part) => part !== 0)) this.turns.set(joint, new Quaternion(...q).normalize());
+    }
+  }
+
+  /** A joint's rotation against its parent. In: as place; out: a Quaternion that is written to. */
+  rotationOf(j, values, out) {
+    const { neutral, stride, inRadians, order, signs } = this.skeleton;
+    const turn = this.parts[3];
+    out.identity();
+    for (const axis of AXES[order]) {
+      const angle = neutral[j * stride + 3 + axis] + values[j * stride + 3 + axis];
+      turn.setFromAxisAngle(UNITS[axis], signs[axis] * (inRadians ? 1 : Math.PI / 180) * angle);
+      out.premultiply(turn);
+    }
+    return out;
+  }
+
   /** World matrices of a pose. In: values float32[joints, 9], deltas from neutral. */
   place(values) {
-    const { neutral, parents, stride, inRadians, order, signs } = this.skeleton;
-    const unit = inRadians ? 1 : Math.PI / 180;
-    const [position, rotation, scale, turn] = this.parts;
+    const { neutral, parents, stride } = this.skeleton;
+    const [position, rotation, scale] = this.parts;
     for (const j of this.order) {
       const at = j * stride;
       const sum = (k) => neutral[at + k] + values[at + k];
       position.set(sum(0), sum(1), sum(2));
-      rotation.identity();
-      for (const axis of AXES[order]) {
-        turn.setFromAxisAngle(UNITS[axis], signs[axis] * unit * sum(3 + axis));
-        rotation.premultiply(turn);
+      this.rotationOf(j, values, rotation);
+      if (this.turns.has(j)) {
+        const rest = this.rotationOf(j, this.rest, new Quaternion());
+        rotation.premultiply(rest.clone().invert()).premultiply(this.turns.get(j)).premultiply(rest);
       }
       scale.set(sum(6), sum(7), sum(8));
       this.world[j].compose(position, rotation, scale);

@@ -108,11 +108,12 @@ class Viewer {
     if (!clip) return;
     const packed = await bytes("clip");
     const values = new Float32Array(packed.buffer, packed.byteOffset, packed.byteLength / 4);
-    this.player = new Player($("player"), clip, values, clip.sound, (pairs) => {
+    this.player = new Player($("player"), clip, values, clip.sound, (pairs, turns) => {
       for (const [control, value] of pairs) {
         this.raw[control] = value;
         this.panel.show(control, value);
       }
+      this.joints.turn(turns);
       this.changed = true;
     });
   }
@@ -121,6 +122,7 @@ class Viewer {
     $("reset").addEventListener("click", () => {
       this.player?.pause();
       this.raw.set(this.rest);
+      this.joints.turn([]);
       this.raw.forEach((value, i) => this.panel.show(i, value));
       this.changed = true;
     });

@@ -2,7 +2,7 @@
 // A clip on the face, with its sound.
 
 export class Player {
-  /** In: clip {rate, frames, controls: [index]}; values float32[frames, controls]; sound: {url, offset} or null. */
+  /** In: clip {rate, frames, controls: [index], turns: [joint]}; values float32[frames, controls + 4 * turns]; sound: {url, offset} or null. */
   constructor(root, clip, values, sound, shown) {
     this.clip = clip;
     this.values = values;
@@ -83,10 +83,14 @@ export class Player {
     const at = Math.min(time * this.clip.rate, this.clip.frames - 1);
     const first = Math.floor(at);
     const second = Math.min(first + 1, this.clip.frames - 1);
-    const width = this.clip.controls.length;
+    const count = this.clip.controls.length;
+    const width = count + 4 * this.clip.turns.length;
     const share = at - first;
     const value = (i) =>
       (1 - share) * this.values[first * width + i] + share * this.values[second * width + i];
-    this.shown(this.clip.controls.map((control, i) => [control, value(i)]));
+    this.shown(
+      this.clip.controls.map((control, i) => [control, value(i)]),
+      this.clip.turns.map((joint, i) => [joint, [0, 1, 2, 3].map((part) => value(count + 4 * i + part))]),
+    );
   }
 }

@@ -138,6 +138,38 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
     assert prepared(own, character).names == own.names
 
 
+def neck_face(folder):
+    """The face whose last joint is the second of the neck: it takes half of the neck's turn."""
+    dna = face()
+    dna.joint_names = ["spine", "neck_01", "neck_02"]
+    dna.raw_control_names = ["jaw", *(f"neck_02.q{part}" for part in PARTS)]
+    dna.save(str(folder / "face.dna"))
+    return dna, load_face(folder / "face.dna")
+
+
+@pytest.mark.parametrize("kind", ["rzc", "csv"])
+def test_a_clips_neck_turns_each_joint_of_the_neck_by_its_share(tmp_path, capsys, kind):
+    dna, _character = neck_face(tmp_path)
+    take = tmp_path / f"take.{kind}"
+    if kind == "rzc":
+        risorius.Clip(["neck.pitch", "jaw"], [[0.0, 0.6], [0.0, 1.0]], 24.0).save(take)
+    else:
+        take.write_text("time,neck.pitch,jaw\n0,0,0\n0.5,0.6,1\n")
+    out = tmp_path / "out.npz"
+    assert (
+        main(["eval", str(take), str(tmp_path / "face.dna"), "-o", str(out), "--what", "controls"])
+        == 0
+    )
+    assert "neck.pitch" not in capsys.readouterr().err
+    with np.load(out) as found:
+        controls = found["controls"][1]
+    to_face = np.array([DIRECTIONS[word] for word in dna.coordinate_system], float).T
+    rest = resting(dna)
+    turn = rest.T @ to_face.T @ head_matrix(0.0, 0.3, 0.0) @ to_face @ rest
+    np.testing.assert_allclose(rotation_of(controls[1:5]), turn, atol=1e-6)
+    assert controls[0] == 1.0
+
+
 @pytest.mark.parametrize(
     ("names", "said"),
     [

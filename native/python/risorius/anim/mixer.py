@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float32]
 Points = tuple[npt.ArrayLike, npt.ArrayLike]
 
 # Curves of these are rotations in radians, and not limited to [0, 1].
-_ROTATIONS = ("head.", "eyeL.", "eyeR.")
+_ROTATIONS = ("head.", "neck.", "eyeL.", "eyeR.")
 _NO_POINTS = (np.zeros(0), np.zeros(0))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 import risorius
 from risorius import importing
+from risorius.importing.mapping import HEAD_ANGLES
 
 from .face import Face
 
@@ -52,7 +53,8 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
     raw = set(face.rig.raw_control_names)
     own = [name for name in found.clip.names if name in raw]
     if mapping is None and not found.mapping and own:
-        others = tuple(name for name in found.clip.names if name not in raw)
+        own = [name for name in found.clip.names if name in raw or name in HEAD_ANGLES]
+        others = tuple(name for name in found.clip.names if name not in own)
         return Performance(found.clip.selected(own), "", others)
     clip, report = found.apply(mapping, rig=face.rig)
     # A mapping knows names of faces; a rig may have others, for a neck's rotation for instance.

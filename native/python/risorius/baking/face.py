@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,14 @@ import numpy.typing as npt
 import risorius
 from risorius.base.errors import ArgumentError
 from risorius.controls.control_names import ControlNames
-from risorius.rigs.joint_controls import JointControl, head_turns, joint_controls
+from risorius.rigs.joint_controls import (
+    ANGLES,
+    JointControl,
+    bone_turns,
+    joint_controls,
+    shared,
+    turned_joints,
+)
 
 Floats = npt.NDArray[np.float32]
 PARTS = ("joints", "shapes", "maps", "controls")
@@ -26,8 +33,6 @@ FIELDS = {
 }
 """What users call the parts of a Pose -> its fields."""
 _LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior", "twist_swing_behavior")
-HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll")
-"""Curves of a clip by which a head turns, radians."""
 _CHUNK_BYTES = 8 << 20  # poses that stay in a processor's cache are several times as fast to use
 
 
@@ -45,6 +50,8 @@ class Face:
     """Of the correctives among the controls: first, end."""
     turning: tuple[JointControl, ...] = ()
     """Joints whose rotation raw controls hold."""
+    shares: Mapping[int, tuple[str, float]] = field(default_factory=dict)
+    """Joints that turn as neck and head, see turned_joints."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -91,7 +98,10 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
     }
     psds = (controls.psd_begin, controls.psd_end)
     turning = tuple(joint_controls(dna)[0])
-    return Face(path.stem, rig, names, dna.translation_unit, dna.rotation_unit, psds, turning)
+    return Face(
+        path.stem, rig, names, dna.translation_unit, dna.rotation_unit, psds, turning,
+        turned_joints(dna.joint_names),
+    )  # fmt: skip
 
 
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
@@ -141,27 +151,28 @@ def prepared(
 
 
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
-    """A clip whose head also turns the raw controls that hold the rotation of the head's joint.
+    """A clip whose neck and head also turn the raw controls that hold the rotations of joints.
 
     Args:
-        clip: with or without curves of HEAD_ANGLES. Curves of these raw controls that it has stay.
+        clip: with or without curves of ANGLES. Curves of these raw controls that it has stay.
         face: on which it plays.
 
     Returns:
-        The clip with up to four curves more.
+        The clip with four curves more for each joint.
     """
-    angles = [name for name in HEAD_ANGLES if name in clip]
-    head = next((t for t in face.turning if t.name.lower() == "head"), None)
-    if head is None or not angles:
-        return clip
     raw = face.rig.raw_control_names
-    names = [raw[control] for control in head.controls]
-    if any(name in clip for name in names):
+    given = dict(zip(clip.names, clip.curves, strict=True))
+    names, curves = list[str](), list[Floats]()
+    for item in face.turning:
+        bone, share = face.shares.get(item.joint, ("", 0.0))
+        own = [raw[control] for control in item.controls]
+        turn = bone_turns(bone, given)
+        if turn is not None and not any(name in clip for name in own):
+            names += own
+            curves += list(item.values(shared(turn, share)).T.astype(np.float32))
+    if not names:
         return clip
-    nothing = np.zeros(clip.frame_count, np.float32)
-    rows = [clip.curve(name) if name in clip else nothing for name in HEAD_ANGLES]
-    curves = head.values(head_turns(np.stack(rows, axis=1))).T.astype(np.float32)
-    return clip.replaced(names=[*clip.names, *names], curves=np.concatenate([clip.curves, curves]))
+    return clip.replaced(names=[*clip.names, *names], curves=np.array([*clip.curves, *curves]))
 
 
 class Chunk(NamedTuple):
@@ -175,6 +186,8 @@ class Chunk(NamedTuple):
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
     """The names of the curves of clip that move nothing: face has no raw control so named."""
     have = set(face.rig.raw_control_names)
+    bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
+    have.update(name for bone in bones for name in ANGLES.get(bone, ()))
     return [name for name in clip.names if name not in have]
 
 

@@ -33,8 +33,9 @@ from .errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 Row = dict[str, float]
 
-# Curves that are no raw controls of a rig: the head, and the eyes as angles; radians.
-ANGLES = ("head.yaw", "head.pitch", "head.roll", "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
+# Curves that are no raw controls of a rig: head and neck, and the eyes as angles; radians.
+HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll", "neck.yaw", "neck.pitch", "neck.roll")
+ANGLES = (*HEAD_ANGLES, "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
     "name", "description", "base", "prefix", "strip", "matching", "gui", "ignore", "rows",
     "shares", "controls", "metadata",

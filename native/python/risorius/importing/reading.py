@@ -19,7 +19,15 @@ from . import fbx, gltf, named_json, ranges, tables, visemes
 from .clock import units
 from .errors import AnimationFileError
 from .keys import Keys, on_one_clock
-from .mapping import ANGLES, Mapped, apply_rows, best_mapping, load_mapping, single_letters
+from .mapping import (
+    ANGLES,
+    HEAD_ANGLES,
+    Mapped,
+    apply_rows,
+    best_mapping,
+    load_mapping,
+    single_letters,
+)
 from .mapping import Mapping as ControlMapping
 from .report import Report
 from .source import Take, decode, make_clip, read_bytes, refuse_other_kinds
@@ -162,10 +170,10 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
     for name in clip.names:
         if name not in ANGLES:
             continue
-        is_head = name.startswith("head.")
+        is_head = name in HEAD_ANGLES
         if rotations == "none" or (rotations == "head" and not is_head):
             drop.add(name)
-    head = [name for name in clip.names if name.startswith("head.")]
+    head = [name for name in clip.names if name in HEAD_ANGLES]
     if head and rotations != "none" and not any(clip.curve(name).any() for name in head):
         drop.update(head)
         report.notes.append("the head does not move: its rotation was not recorded")

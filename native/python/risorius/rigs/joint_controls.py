@@ -11,6 +11,7 @@ joint against the neutral pose, about the joint's own axes, in the file's coordi
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,11 @@ from .._native import Dna
 from .rotation import Convention, Doubles, product
 
 PARTS = ("x", "y", "z", "w")
+ANGLES = {
+    "neck": ("neck.yaw", "neck.pitch", "neck.roll"),
+    "head": ("head.yaw", "head.pitch", "head.roll"),
+}
+"""Curves of a clip by which neck and head turn, radians, see head_turns."""
 _NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
 # In a face's own axes: x to its left, y to its back, z up.
 _FACE_AXES = {
@@ -106,7 +112,7 @@ def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
         if stem in where and len(by_part) == len(PARTS):
             x, y, z, w = (by_part[part][0] for part in PARTS)
             joint = where[stem]
-            found.append(JointControl(joint, stem, (x, y, z, w), _axes(dna, joint)))
+            found.append(JointControl(joint, stem, (x, y, z, w), turn_axes(dna, joint)))
     return found, said
 
 
@@ -137,7 +143,12 @@ def _read_by_solvers(dna: Dna) -> set[int]:
     return {int(i) for indices in read for i in indices}
 
 
-def _axes(dna: Dna, joint: int) -> Doubles:
+def turn_axes(dna: Dna, joint: int) -> Doubles:
+    """The axes of a joint, float64[3, 3], see JointControl.axes.
+
+    Args:
+        dna: with definition and behavior; joint: its index.
+    """
     convention, parents = Convention.of(dna), dna.joint_parents
     chain = [joint]
     while int(parents[chain[-1]]) != chain[-1] and len(chain) <= len(parents):
@@ -159,8 +170,61 @@ def matrix(q: Doubles) -> Doubles:
     return np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
 
 
+def turned_joints(names: Sequence[str]) -> dict[int, tuple[str, float]]:
+    """The joints that turn as neck and head, by their usual names in any case.
+
+    Args:
+        names: of the file's joints.
+
+    Returns:
+        Joint -> "neck" or "head", and the share of the turn that the joint takes: `neck_01` and
+        `neck_02` divide that of the neck.
+    """
+    where: dict[str, int] = {}
+    for index, name in enumerate(names):
+        where.setdefault(name.lower().replace(".", "_"), index)
+    neck = [where[name] for name in ("neck_01", "neck_02") if name in where]
+    if not neck and "neck" in where:
+        neck = [where["neck"]]
+    found = {joint: ("neck", 1.0 / len(neck)) for joint in neck}
+    if "head" in where:
+        found[where["head"]] = ("head", 1.0)
+    return found
+
+
+def shared(turns: Doubles, share: float) -> Doubles:
+    """A share of turns, the short way round.
+
+    Args:
+        turns: float64[..., 4], x, y, z, w of unit quaternions; share: 0 to 1.
+    """
+    turns = np.where(turns[..., 3:] < 0.0, -turns, turns)
+    sine = np.linalg.norm(turns[..., :3], axis=-1, keepdims=True)
+    half = share * np.arctan2(sine, turns[..., 3:])
+    axis = turns[..., :3] / np.where(sine > 0.0, sine, 1.0)
+    return np.concatenate([axis * np.sin(half), np.cos(half)], axis=-1)
+
+
+def bone_turns(bone: str, curves: Mapping[str, npt.NDArray[np.float32]]) -> Doubles | None:
+    """How a clip turns the neck or the head.
+
+    Args:
+        bone: "neck" or "head".
+        curves: float32[frames] by name, of the whole clip.
+
+    Returns:
+        float64[frames, 4] as of head_turns; None where the clip has no such curve.
+    """
+    rows = [curves.get(name) for name in ANGLES.get(bone, ())]
+    some = next((row for row in rows if row is not None), None)
+    if some is None:
+        return None
+    nothing = np.zeros(len(some), np.float32)
+    return head_turns(np.stack([nothing if row is None else row for row in rows], axis=1))
+
+
 def head_turns(angles: npt.NDArray[Any]) -> Doubles:
-    """Rotations of a head from a clip's angles.
+    """Rotations of a head or a neck from a clip's angles.
 
     Args:
         angles: [n, 3] radians: yaw to the face's own left, pitch up, roll towards its own left

@@ -19,6 +19,14 @@ from .._native import Dna
 from ..anim.clip import Clip
 from ..base.errors import RisoriusError
 from ..controls.regions import TITLES, region_of
+from ..rigs.joint_controls import (
+    JointControl,
+    bone_turns,
+    joint_controls,
+    shared,
+    turn_axes,
+    turned_joints,
+)
 from .pictures import Pictures
 
 _EMPTY = "page.html"
@@ -63,7 +71,7 @@ def render(
         dna: with behavior and geometry.
         title: of the page.
         pictures: of the meshes, of find_pictures.
-        clip: that plays on it, of its raw controls.
+        clip: that plays on it, of its raw controls and the angles of neck and head.
         sound: what is heard with the clip: the bytes of a file, its ending (one of SOUNDS), and
             at which second of the clip it begins.
 
@@ -86,7 +94,7 @@ def render(
     }
     parts = [_element("face", dna.to_bytes())]
     if clip is not None:
-        table["clip"], values = _clip(clip, names)
+        table["clip"], values = _clip(clip, names, dna)
         table["clip"]["sound"] = _sound(sound)
         parts.append(_element("clip", values))
     # Nothing in it may end the element that it stands in.
@@ -110,20 +118,46 @@ def _regions(names: list[str]) -> list[dict[str, Any]]:
     return [{"title": TITLES[region], "controls": list_} for region, list_ in of.items() if list_]
 
 
-def _clip(clip: Clip, names: list[str]) -> tuple[dict[str, Any], bytes]:
-    """What the player needs, and float32[frames, controls] of the controls that the clip moves."""
+def _clip(clip: Clip, names: list[str], dna: Dna) -> tuple[dict[str, Any], bytes]:
+    """What the player needs, and float32[frames, controls + 4 * turns].
+
+    First the controls that the clip moves, then the turns of the joints of neck and head as
+    quaternions (x, y, z, w) against rest, about the joint's own axes, in the file's space.
+    """
     even = clip if clip.times is None else clip.resampled(clip.rate)
+    curves = np.nan_to_num(even.curves, nan=0.0, posinf=1.0, neginf=0.0)
+    given = dict(zip(even.names, curves, strict=True))
     known = [name for name in even.names if name in set(names)]
-    if not known or even.frame_count == 0:
+    turns = _turns(given, dna) if even.frame_count else {}
+    if not (known or turns) or even.frame_count == 0:
         raise WebError("the clip moves no raw control of this face")
-    curves = np.nan_to_num(even.selected(known).curves, nan=0.0, posinf=1.0, neginf=0.0)
     index = {name: i for i, name in enumerate(names)}
     about = {
         "rate": even.rate,
         "frames": even.frame_count,
         "controls": [index[name] for name in known],
+        "turns": list(turns),
     }
-    return about, np.ascontiguousarray(curves.T, "<f4").tobytes()
+    columns = [*(given[name][:, None] for name in known), *turns.values()]
+    return about, np.ascontiguousarray(np.concatenate(columns, axis=1), "<f4").tobytes()
+
+
+def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
+    """Joint -> float64[frames, 4]: as its raw controls say, else as the angles of its bone."""
+    controls = {item.joint: item for item in joint_controls(dna)[0]}
+    raw = dna.raw_control_names
+    found = {}
+    for joint, (bone, share) in turned_joints(dna.joint_names).items():
+        item = controls.get(joint)
+        own = [raw[control] for control in item.controls] if item else []
+        rows = [given[name] for name in own if name in given]
+        turn = bone_turns(bone, given)
+        if rows and len(rows) == len(own):
+            found[joint] = np.stack(rows, axis=1)
+        elif turn is not None:
+            plain = JointControl(joint, "", (0, 0, 0, 0), turn_axes(dna, joint))
+            found[joint] = plain.values(shared(turn, share))
+    return found
 
 
 def _sound(sound: Sound | None) -> dict[str, Any] | None:
