@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 import risorius
-from mathutils import Euler, Matrix, Quaternion
+from mathutils import Euler, Matrix, Quaternion, Vector
 from support import oracle, scene
 from support.faces import HEAD, NECK_POSES, SIDE, TURNING, UP, neck_face
 
@@ -398,3 +398,53 @@ def test_a_joint_that_follows_a_bone_which_no_pose_moves_is_no_circle(face):
         np.testing.assert_allclose(_shown(rig), _wanted(dna, head=_seen_turn(rig)), atol=1e-5)
     assert scene.submodule("scene.frame.joint_readings").words(rig) == ""
     assert _seen_turn(rig).angle > 0.1
+
+
+def test_a_layer_turns_the_neck_too(face):
+    rig, dna = face()
+    clips = scene.submodule("scene.animation.clip_actions")
+    clip = risorius.Clip(["neck.pitch", "head.yaw"], [[0.4, 0.4], [0.2, 0.2]], 24.0)
+    timing = clips.timing_of(clip, bpy.context.scene, 0.0)
+    action = clips.make_action(rig, clip, timing, "Turn").action
+    layers = scene.submodule("scene.animation.layers")
+    layers.add(scene.controls(rig), "ACTION", "Layer").action = action
+    bpy.context.scene.frame_set(0)
+    neck, head = Quaternion((-1.0, 0.0, 0.0), 0.4), Quaternion((0.0, 0.0, 1.0), 0.2)
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, neck, head), atol=1e-5)
+    assert np.abs(_shown(rig)[4:]).max() > 0.01
+
+
+@pytest.mark.parametrize("mirrored", [1.0, -1.0])
+def test_an_attached_body_fires_them_as_it_turns(face, mirrored):
+    rig, dna = face()
+    body = bpy.data.objects.new("body", bpy.data.armatures.new("body"))
+    bpy.context.scene.collection.objects.link(body)
+    body.scale, body.rotation_euler = (2.0 * mirrored, 2.0, 2.0), (0.3, 0.2, 1.0)
+    bpy.context.view_layer.objects.active = body
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, parent, roll in (("spine", None, 0.1), ("neck", "spine", 0.7), ("head", "neck", 0.4)):
+        bone = body.data.edit_bones.new(name)
+        above = body.data.edit_bones[parent] if parent else None
+        bone.head = above.tail if above else (0.0, 0.0, 1.0)
+        bone.tail, bone.roll, bone.parent = bone.head + Vector((0.02, 0.05, 0.2)), roll, above
+    bpy.ops.object.mode_set(mode="OBJECT")
+    controls = scene.controls(rig)
+    bpy.context.view_layer.objects.active = controls
+    attach = scene.submodule("scene.character.rig_placement").attach
+    bpy.context.view_layer.update()
+    attach(controls, body, "spine", "neck", "head", "NONE")
+    wanted = {}
+    bpy.context.view_layer.update()
+    from_face = (
+        np.linalg.inv(np.array(body.matrix_world)[:3, :3]) @ np.array(controls.matrix_world)[:3, :3]
+    )
+    for name, angles in (("neck", (0.2, 0.3, -0.1)), ("head", (-0.3, 0.2, 0.2))):
+        bone = body.pose.bones[name]
+        bone.rotation_mode, bone.rotation_euler = "XYZ", angles
+        rest = np.array(bone.bone.matrix_local.to_3x3())
+        turn = rest @ np.array(Euler(angles).to_matrix()) @ np.linalg.inv(rest)
+        own = np.linalg.inv(from_face) @ turn @ from_face
+        wanted[name] = Matrix(own.tolist()).to_quaternion()
+    scene.update(body)
+    np.testing.assert_allclose(_shown(rig), _wanted(dna, wanted["neck"], wanted["head"]), atol=1e-5)
+    assert np.abs(_shown(rig)[4:]).max() > 0.01

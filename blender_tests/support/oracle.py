@@ -30,8 +30,8 @@ def _rotation(dna, angles):
     return matrix
 
 
-def _world(dna, deltas):
-    """Joint matrices in the file's space."""
+def _world(dna, deltas, turns=None):
+    """Joint matrices in the file's space. Args: turns  of `vertices`."""
     parents = dna.joint_parents
     result = []
     for joint, parent in enumerate(parents):
@@ -39,6 +39,9 @@ def _world(dna, deltas):
         local = np.eye(4)
         angles = dna.neutral_joint_rotations[joint].astype(np.float64) + d[3:6]
         local[:3, :3] = _rotation(dna, angles) @ np.diag(1 + d[6:9])
+        if turns and joint in turns:
+            rest = _rotation(dna, dna.neutral_joint_rotations[joint].astype(np.float64))
+            local[:3, :3] = rest @ turns[joint] @ rest.T @ local[:3, :3]
         local[:3, 3] = dna.neutral_joint_translations[joint].astype(np.float64) + d[:3]
         result.append(local if parent == joint else result[parent] @ local)
     return result
@@ -51,7 +54,7 @@ def to_blender(dna, points, unit_scale=1.0):
     return points @ axes.T * metres / unit_scale
 
 
-def vertices(dna, mesh_index, pose, unit_scale=1.0, extra=None):
+def vertices(dna, mesh_index, pose, unit_scale=1.0, turns=None):
     """Deformed vertices of a mesh, float64[V, 3] in Blender units.
 
     Args:
@@ -59,8 +62,7 @@ def vertices(dna, mesh_index, pose, unit_scale=1.0, extra=None):
         mesh_index: which mesh.
         pose: risorius.Pose.
         unit_scale: metres per Blender unit.
-        extra: joint -> float64[4, 4] acting on the joint's children and skin in file space,
-            applied after everything else.
+        turns: joint -> float64[3, 3], how a host turns it against rest, about its own axes.
     """
     mesh = dna.meshes[mesh_index]
     points = mesh.positions.astype(np.float64)
@@ -68,7 +70,7 @@ def vertices(dna, mesh_index, pose, unit_scale=1.0, extra=None):
         weight = float(pose.blend_shapes[target.blend_shape_channel_index])
         np.add.at(points, target.vertex_indices, weight * target.deltas.astype(np.float64))
     rest = _world(dna, np.zeros((len(dna.joint_names), 9)))
-    posed = _world(dna, pose.joints)
+    posed = _world(dna, pose.joints, turns)
     moves = [p @ np.linalg.inv(r) for p, r in zip(posed, rest, strict=True)]
     homogeneous = np.concatenate([points, np.ones((len(points), 1))], axis=1)
     result = np.zeros((len(points), 3))

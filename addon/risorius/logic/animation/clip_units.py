@@ -14,6 +14,10 @@ from ..base.sentences import told
 
 Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
+NECK = ("neck.yaw", "neck.pitch", "neck.roll")
+TURNED = {"head": HEAD, "neck": NECK}
+"""Control bones that layers mix -> their angles, in the order of the mixer."""
+ANGLES = (*HEAD, *NECK)
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
 
@@ -153,7 +157,7 @@ def keys_of(
             )
         )
     keys = Keys()
-    turned = [HEAD, *EYES.values()]
+    turned = [*TURNED.values(), *EYES.values()]
     angles = {name for group in turned for name in group}
     for name, values in zip(names, curves, strict=True):
         if name in sliders:
@@ -190,7 +194,7 @@ def _add_turns(
     with_eyes: bool,
 ) -> None:
     rows = dict(zip(names, curves, strict=True))
-    groups = {"head": HEAD, **({f"eye_{s}": n for s, n in EYES.items()} if with_eyes else {})}
+    groups = {**TURNED, **({f"eye_{s}": n for s, n in EYES.items()} if with_eyes else {})}
     for bone, group in groups.items():
         if not len(frames) or not any(name in rows for name in group):
             continue
@@ -207,7 +211,7 @@ def _add_turns(
 
 
 def quaternions(angles: Float) -> Float:
-    """Turns of a head or an eye.
+    """Turns of a head, a neck or an eye.
 
     Args:
         angles: float64[n, 2 or 3], radians: yaw to the face's own left, pitch up, and roll towards

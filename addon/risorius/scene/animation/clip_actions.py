@@ -97,7 +97,7 @@ def make_action(
 
     Args:
         rig: the character's deforming armature.
-        clip: risorius.Clip; "head.yaw" and its like turn the head and eye bones.
+        clip: risorius.Clip; "head.yaw" and its like turn the bones of head, neck and eyes.
         timing: see timing_of.
         name: of the action.
         with_eyes: also turn the eye bones, where the clip has eye rotation.
@@ -297,7 +297,7 @@ def clip_of_action(
 
     Returns:
         risorius.Clip of the sliders that it moves, by their property names, and "head.yaw" and its
-        like where it turns the head bone. See dna_names.
+        like where it turns the bones of head and neck. See dna_names.
     """
     frames = np.asarray(frames, np.float64)
     curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
@@ -307,10 +307,11 @@ def clip_of_action(
         if curve is not None:
             found.append(label)
             rows.append(sampled(curve, frames))
-    head = _head_rows(controls, curves, frames)
-    if head is not None:
-        found += clip_units.HEAD
-        rows += list(head)
+    for bone, angles in clip_units.TURNED.items():
+        turned = _turn_rows(controls, bone, curves, frames)
+        if turned is not None:
+            found += angles
+            rows += list(turned)
     return native.module().Clip(
         found,
         np.array(rows, np.float32).reshape(len(rows), len(frames)),
@@ -373,18 +374,19 @@ def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.
     ]
 
 
-def _head_rows(
+def _turn_rows(
     controls: ArmatureObject,
+    name: str,
     curves: Mapping[tuple[str, int], bpy.types.FCurve],
     frames: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:
-    """float64[3, n]: how the head bone is turned, or None where it is not."""
-    bone = controls.pose.bones.get("head")
+    """float64[3, n]: how the bone of the head or the neck is turned, or None where it is not."""
+    bone = controls.pose.bones.get(name)
     if bone is None:
         return None
     # Its own way first: an action of another face may turn the head in another way.
     for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):
-        path = f'pose.bones["head"].{_ROTATIONS.get(mode, "rotation_euler")}'
+        path = f'pose.bones["{name}"].{_ROTATIONS.get(mode, "rotation_euler")}'
         rest = {"QUATERNION": (1.0, 0.0, 0.0, 0.0), "AXIS_ANGLE": (0.0, 0.0, 1.0, 0.0)}.get(
             mode, (0.0, 0.0, 0.0)
         )

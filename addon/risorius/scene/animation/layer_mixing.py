@@ -46,6 +46,8 @@ _MOST_FIRED = 4096
 _IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
 
 
+Turns = Mapping[str, Quaternion | None]
+_TURNED = tuple(clip_logic.TURNED)
 Times = dict[str, object]  # keyword arguments of risorius.Layer that say when it plays
 Source: TypeAlias = "tuple[native.Clip | dict[str, float], Times]"
 
@@ -64,7 +66,7 @@ class Stack:
 
     Attributes:
         made_of: what they were compiled from.
-        mixer: risorius.Mixer of the character's labels, then the head's three angles.
+        mixer: risorius.Mixer of the character's labels, then the angles of head and neck.
         layers: risorius.Layer, bottom to top, at full weight.
         places: of each the place among the settings.
         weights: of all settings by place, as the mixer has them now.
@@ -111,26 +113,27 @@ def mix(
     seen: ArmatureObject,
     live: runtime.Runtime,
     raw: NDArray[np.float32],
-    head: Quaternion | None,
+    own: Turns,
     depsgraph: Depsgraph,
     maximum: float,
-) -> tuple[NDArray[np.float32], Quaternion | None]:
-    """Mix the layers of a character over its sliders and its head bone.
+) -> tuple[NDArray[np.float32], Turns]:
+    """Mix the layers of a character over its sliders and the bones of its head and neck.
 
     Args:
         seen: the evaluated control armature; its layers have the weights of this frame.
         live: the character's Runtime.
         raw: float32[R], the sliders.
-        head: Quaternion in the armature's axes by which the head bone is turned, or None.
+        own: "head" and "neck" -> Quaternion in the armature's axes by which the bone is turned, or
+            None.
         depsgraph: its scene gives the time.
         maximum: of the sliders.
 
     Returns:
-        float32[R], and the head's turn.
+        float32[R], and the turns as `own`.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:
-        return raw, head  # baked controls have them in their action
+        return raw, own  # baked controls have them in their action
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
     # Where there are not as many, one was added and not evaluated since.
@@ -138,15 +141,20 @@ def mix(
     weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
     if stack.weights != weights:
         _set_weights(stack, weights)
-    base = np.zeros(len(raw) + 3, np.float32)
+    base = np.zeros(len(raw) + len(clip_logic.ANGLES), np.float32)
     base[: len(raw)] = raw
-    if head is not None:
-        base[len(raw) :] = clip_logic.angles_of(np.array(head))
+    rows = {name: slice(len(raw) + 3 * i, len(raw) + 3 * i + 3) for i, name in enumerate(_TURNED)}
+    for name, row in rows.items():
+        turn = own.get(name)
+        if turn is not None:
+            base[row] = clip_logic.angles_of(np.array(turn))
     out = stack.mixer.evaluate(scene.frame_current_final / clip_actions.frame_rate(scene), base)
-    angles = out[len(raw) :]
-    if not np.array_equal(angles, base[len(raw) :]):
-        head = Quaternion(clip_logic.quaternions(angles[None].astype(np.float64))[0])
-    return np.ascontiguousarray(out[: len(raw)]), head
+    mixed = dict(own)
+    for name, row in rows.items():
+        if not np.array_equal(out[row], base[row]):
+            angles = out[row][None].astype(np.float64)
+            mixed[name] = Quaternion(clip_logic.quaternions(angles)[0])
+    return np.ascontiguousarray(out[: len(raw)]), mixed
 
 
 def compiled(
@@ -213,7 +221,7 @@ def _compile(
 
 def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> native.Mixer:
     return native.module().Mixer(
-        [*live.labels, *clip_logic.HEAD],
+        [*live.labels, *clip_logic.ANGLES],
         ranges={n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)},
         exclusives="default" if controls.risorius_layer_rules else None,
         max_fired=_MOST_FIRED,
@@ -292,19 +300,19 @@ def native_layer(
 
 def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32]:
     allowed = allowed_names(live, layer)
-    names = [*live.labels, *clip_logic.HEAD]
+    names = [*live.labels, *clip_logic.ANGLES]
     return np.array([name in allowed for name in names], np.float32)
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """What a layer may move: sliders, and the head's angles, which belong to the neck's region.
+    """What a layer may move: sliders, and the angles of head and neck, of the neck's region.
 
     Args:
         live: Runtime of the character, for the names of its sliders.
         layer: settings with the regions and the patterns of names.
     """
     chosen = {region.lower() for region in layer.regions}
-    labels = [*live.labels, *clip_logic.HEAD]
+    labels = [*live.labels, *clip_logic.ANGLES]
     return set(logic.masked(labels, native.regions(), chosen, layer.controls))
 
 

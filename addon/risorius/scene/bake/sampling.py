@@ -214,7 +214,7 @@ class _Reader:
             )
         got.turns.append(turns)
         got.places[number] = seen.matrix_world
-        self._read_control_bones(number, seen, own["head"])
+        self._read_control_bones(number, seen, own)
         if got.bones is not None:
             moved = self.rig.evaluated_get(depsgraph).pose.bones
             for name, values in got.bones.items():
@@ -262,9 +262,9 @@ class _Reader:
             self.rig.update_tag(refresh={"OBJECT"})
 
     def _read_control_bones(
-        self, number: int, seen: ArmatureObject, head: Quaternion | None
+        self, number: int, seen: ArmatureObject, own: Mapping[str, Quaternion | None]
     ) -> None:
-        """Args: head  how it is turned with the layers, in the armature's axes; or None."""
+        """Args: own  how neck and head are turned with the layers, in the armature's axes."""
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -275,12 +275,13 @@ class _Reader:
                 if bone.constraints
                 else bone.matrix_basis
             )
-        if self.layered and head is not None and "head" in basis:
-            matrix = Matrix(basis["head"][number].tolist())
-            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
-            basis["head"][number] = Matrix.LocRotScale(
-                matrix.to_translation(), rest.inverted() @ head @ rest, matrix.to_scale()
-            )
+        for name, turn in own.items() if self.layered else ():
+            if turn is not None and name in basis:
+                matrix = Matrix(basis[name][number].tolist())
+                rest = self.controls.data.bones[name].matrix_local.to_quaternion()
+                basis[name][number] = Matrix.LocRotScale(
+                    matrix.to_translation(), rest.inverted() @ turn @ rest, matrix.to_scale()
+                )
 
 
 def _value(owner: bpy.types.ID, path: str) -> list[float] | None:

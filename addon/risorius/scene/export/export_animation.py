@@ -264,7 +264,7 @@ def clip(
     origin: float,
     maps: bool = False,
 ) -> native.Clip:
-    """The raw controls of a range, and how the head was turned.
+    """The raw controls of a range, and how neck and head were turned.
 
     Args:
         rig: deforming armature.
@@ -281,10 +281,11 @@ def clip(
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):
         names.append(label if name in names else name)
     rows = samples.raw.T
-    if any("head" in turns for turns in samples.turns):
-        names += clip_units.HEAD
-        heads = np.array([turns.get("head", Quaternion()) for turns in samples.turns])
-        rows = np.concatenate([rows, clip_units.angles_of(heads).T])
+    for bone in ("neck", "head"):
+        if any(bone in turns for turns in samples.turns):
+            names += clip_units.TURNED[bone]
+            turned = np.array([turns.get(bone, Quaternion()) for turns in samples.turns])
+            rows = np.concatenate([rows, clip_units.angles_of(turned).T])
     if maps:
         labels = unique_labels(live.dna.animated_map_names, names)
         names += labels

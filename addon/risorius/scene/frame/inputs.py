@@ -50,8 +50,8 @@ def read_mixed(
     live: runtime.Runtime,
     depsgraph: Depsgraph,
     maximum: float = 1.0,
-) -> tuple[NDArray[np.float32], dict[str, Quaternion | None]]:
-    """Read the sliders and the head's bones with the layers above them.
+) -> tuple[NDArray[np.float32], Mapping[str, Quaternion | None]]:
+    """Read the sliders and the bones of head and neck with the layers above them.
 
     Args:
         seen, live, depsgraph, maximum: as of `read_inputs`.
@@ -63,8 +63,7 @@ def read_mixed(
     bones = seen.pose.bones
     raw = read_leading(seen, live)
     own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
-    raw, own["head"] = layer_mixing.mix(seen, live, raw, own["head"], depsgraph, maximum)
-    return raw, own
+    return layer_mixing.mix(seen, live, raw, own, depsgraph, maximum)
 
 
 def seen_sliders(context: Context, rig: ArmatureObject) -> dict[str, float]:

@@ -17,7 +17,7 @@ from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 from ..frame import inputs
 
-HEAD_ANGLES = len(clip_units.HEAD)  # which the mixer has after the controls
+_ANGLES = len(clip_units.ANGLES)  # which the mixer has after the controls
 Controls = NDArray[np.float32]
 
 
@@ -26,7 +26,7 @@ def raw_pair(
 ) -> tuple[Controls, Controls]:
     """The raw controls of now, with a layer and without it: float32[R] each.
 
-    How it turns the head is not in it: that is no control.
+    How it turns head and neck is not in it: that is no control.
 
     Args:
         rig: deforming armature.
@@ -47,7 +47,7 @@ def raw_pair(
     at = stack.places.index(place)
     layer = stack.layers[at]
     # One that was solo and is muted would let others through: one that moves nothing does not.
-    stack.layers[at] = replace(layer, mask=np.zeros(len(live.labels) + HEAD_ANGLES, np.float32))
+    stack.layers[at] = replace(layer, mask=np.zeros(len(live.labels) + _ANGLES, np.float32))
     stack.weights = ()  # so that the mixer takes its layers anew
     try:
         without_it, _ = inputs.read_inputs(seen, live, depsgraph, maximum)
