@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import gzip
+import importlib
 import json
 import subprocess
 import sys
@@ -20,10 +21,13 @@ import numpy as np
 import risorius
 from browser import Browser, browser
 from risorius import web
+from risorius.baking.face import load_face, prepared
 from risorius.web import page as pages
 
-GOLDEN = Path(__file__).resolve().parents[2] / "tests" / "data" / "golden"
+ROOT = Path(__file__).resolve().parents[2]
+GOLDEN = ROOT / "tests" / "data" / "golden"
 POSES = 12
+TURNED = 1e-5  # of the head's size: vertices are float32
 EVALUATE = """(rows => {
   const floats = [];
   for (const [lod, raw] of rows) {
@@ -106,6 +110,56 @@ async def says_error(one: Browser, built: Path, face: Path) -> None:
     print(f"a face cut short: {said}")
 
 
+def about(axis: tuple[float, float, float], angle: float) -> np.ndarray:
+    """float64[3, 3]: a turn by the right hand."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+async def same_turned_head(one: Browser, built: Path) -> str:
+    """A clip that turns neck and head, on a face with neck poses: vertices against NumPy.
+
+    Returns: a sentence. Raises: RuntimeError: they differ.
+    """
+    sys.path.append(str(ROOT / "blender_tests"))
+    faces, oracle = (importlib.import_module(f"support.{name}") for name in ("faces", "oracle"))
+    dna = faces.neck_face()
+    path = built / "neck.dna"
+    dna.save(str(path))
+    angles = {"neck": (0.2, -0.3, 0.1), "head": (-0.4, 0.3, 0.2)}
+    names = [f"{bone}.{way}" for bone in angles for way in ("yaw", "pitch", "roll")]
+    curves = [[0.0, value] for value in (*angles["neck"], *angles["head"])]
+    clip = prepared(
+        risorius.Clip([*names, dna.raw_control_names[0]], [*curves, [0.0, 0.7]], 2.0),
+        load_face(path),
+    )
+    state = await one.open(written(built, "neck", pages.render(dna, "neck", clip=clip)), 1440, 900)
+    if state != "ready":
+        raise RuntimeError(await one.evaluate("document.getElementById('error-text').textContent"))
+    found = await one.evaluate(
+        "risorius.player.seek(0.5), risorius.pose(), [...risorius.parts.get(0).skin.placed]"
+    )
+    shown = np.array(found).reshape(-1, 3) @ np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    rig = risorius.Rig(dna)
+    raw, turns = rig.initial_raw_controls.copy(), {}
+    for name, value in zip(clip.names, clip.curves[:, 1], strict=True):
+        if name in rig.raw_control_names:
+            raw[rig.raw_control_names.index(name)] = value
+    rest = oracle._world(dna, np.zeros((len(dna.joint_names), 9)))
+    basis = np.array([oracle._AXES[word] for word in dna.coordinate_system], float).T
+    for joint, bone in ((1, "neck"), (2, "head")):
+        yaw, pitch, roll = angles[bone]
+        turn = about((0, 0, 1), yaw) @ about((-1, 0, 0), pitch) @ about((0, 1, 0), roll)
+        axes = basis @ rest[joint][:3, :3]
+        turns[joint] = axes.T @ turn @ axes
+    wanted = oracle.vertices(dna, 0, rig.evaluate(raw), turns=turns)
+    apart = np.abs(shown - wanted).max() / np.ptp(wanted, axis=0).max()
+    if not apart < TURNED:
+        raise RuntimeError(f"a turned head is {apart:g} of its size off")
+    return f"a head that a clip turns, with its neck poses: {apart:.1e} of its size off"
+
+
 def smile(names: list[str]) -> risorius.Clip:
     """Two seconds of a smile with an open mouth."""
     t = np.linspace(0, 2, 61)
@@ -171,6 +225,7 @@ async def main(built: Path, face: Path) -> None:
             print(await same_numbers(one, path, page, places))
         page = written(built, "sample", pages.render(risorius.load(face), "sample"))
         print(await same_numbers(one, face, page))
+        print(await same_turned_head(one, built))
         await says_error(one, built, GOLDEN / "medium.dna")
         await pictures(one, built, face)
         if one.said:
