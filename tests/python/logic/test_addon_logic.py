@@ -14,6 +14,7 @@ import pytest
 import risorius
 from risorius.controls.regions import TITLES, region_of
 from risorius.controls.sides import mirrored_name, name_across
+from risorius.rigs.joint_controls import turned_joints
 
 STANDARD = Path(__file__).resolve().parents[2] / "data" / "controls" / "standard_raw.txt"
 LOGIC = Path(__file__).resolve().parents[3] / "addon" / "risorius" / "logic"
@@ -438,6 +439,12 @@ class TestPlans:
     def test_anchors_by_name(self) -> None:
         found = plans.find_anchors(["spine", "neck_01", "neck_02", "head", "FACIAL_R_Eye"])
         assert (found.neck, found.head, found.eyes) == ((1, 2), 3, {"R": 4})
+
+    @pytest.mark.parametrize("joints", [["Neck", "HEAD"], ["neck.02", "Neck_01", "neck", "head"]])
+    def test_scene_and_clips_turn_the_same_joints(self, joints: list[str]) -> None:
+        found = plans.find_anchors(joints)
+        shares = {joint: ("neck", 1.0 / len(found.neck)) for joint in found.neck}
+        assert turned_joints(joints) == {**shares, found.head: ("head", 1.0)}
 
     def test_a_file_without_geometry_is_refused_in_a_sentence(self) -> None:
         with pytest.raises(plans.PlanError, match="no geometry"):

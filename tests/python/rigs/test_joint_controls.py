@@ -191,3 +191,14 @@ def test_controls_that_are_zero_or_too_long_are_evaluated_as_they_are():
     for values in ([0, 0, 0, 0], [0, 0, 0, 7], [np.float32(3e38)] * 4):
         pose = rig.evaluate([0, *values])
         assert not np.isinf(pose.blend_shapes).any()
+
+
+@pytest.mark.parametrize("second", [(0, 0, 0, 1), (0, 0, 0, -1)], ids=["q", "-q"])
+def test_poses_that_are_one_rotation_share_what_is_near_them(second):
+    dna = face()
+    solvers = dna.rbf_behavior.solvers
+    solvers[0].raw_control_values = [0, 0, 0, 1, *second]
+    dna.rbf_behavior.solvers = solvers
+    rig = risorius.Rig(dna)
+    assert rig.evaluate([0, 0, 0, 0, 1]).controls[-2:] == pytest.approx([0.5, 0.5], abs=1e-4)
+    assert rig.evaluate([0, *UP]).controls[-2:] == pytest.approx([0.0, 0.0], abs=1e-2)

@@ -21,6 +21,7 @@ class Reading:
     """What turns the joints of one face, until its file is edited.
 
     Attributes:
+        held: positions of the bones of the joints whose rotation raw controls hold.
         wiring: what is compared to see whether it still holds.
         keyed: positions of the bones of neck and head that keys or drivers of the deforming
             armature turn: these lead, the evaluator does not write them.
@@ -29,6 +30,7 @@ class Reading:
         is_fresh: whether nothing was edited since.
     """
 
+    held: tuple[int, ...]
     wiring: tuple[object, ...]
     keyed: frozenset[int]
     places: dict[int, int]
@@ -60,12 +62,13 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
     """
     kept = written.readings.get(rig.session_uid)
     before = kept if isinstance(kept, Reading) else None
-    writer = bone_writer.writer_of(rig, live)
-    wiring = _wiring(rig, writer)
-    if before is not None and before.wiring == wiring and not edited:
+    if before is None and not live.turning and not drivers.moves(rig):
+        return Reading((), (), frozenset(), {}, "")
+    if before is not None and not edited and before.wiring == _wiring(rig, before.held):
         before.is_fresh = True
         return before
-    keyed = _keyed(rig, writer)
+    writer = bone_writer.writer_of(rig, live)
+    keyed, held = _keyed(rig, writer), tuple(writer.driving.values())
     bones, places, circles = rig.pose.bones, dict[int, int](), list[str]()
     for item in live.turning:
         place = writer.driving.get(item.joint)
@@ -76,7 +79,7 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
             circles.append(circle)
         else:
             places[item.joint] = place
-    found = Reading(wiring, keyed, places, next(iter(circles), ""))
+    found = Reading(held, _wiring(rig, held), keyed, places, next(iter(circles), ""))
     written.readings[rig.session_uid] = found
     if found.circle and (before is None or before.circle != found.circle):
         console.say(f"{rig.name}: {joint_circles.words(found.circle)}")
@@ -108,12 +111,14 @@ def words(rig: ArmatureObject) -> str:
     return joint_circles.words(kept.circle)
 
 
-def _wiring(rig: ArmatureObject, writer: bone_writer.Writer) -> tuple[object, ...]:
+def _wiring(rig: ArmatureObject, held: tuple[int, ...]) -> tuple[object, ...]:
     bones = rig.pose.bones
+    stacks = [(place, bones[place].constraints) for place in held]
     holds = tuple(
         (place, hold.name, hold.type, hold.mute)
-        for place in writer.driving.values()
-        for hold in bones[place].constraints
+        for place, stack in stacks
+        if len(stack)
+        for hold in stack
     )
     if not drivers.moves(rig):
         return (holds,)

@@ -149,13 +149,14 @@ def _turns(given: dict[str, Any], dna: Dna) -> dict[int, Any]:
     found = {}
     for joint, (bone, share) in turned_joints(dna.joint_names).items():
         item = controls.get(joint)
-        rows = [given.get(raw[control]) for control in item.controls] if item else []
+        own = [raw[control] for control in item.controls] if item else []
+        rows = [given[name] for name in own if name in given]
         turn = bone_turns(bone, given)
-        if rows and all(row is not None for row in rows):
+        if rows and len(rows) == len(own):
             found[joint] = np.stack(rows, axis=1)
         elif turn is not None:
-            own = JointControl(joint, "", (0, 0, 0, 0), turn_axes(dna, joint))
-            found[joint] = own.values(shared(turn, share))
+            plain = JointControl(joint, "", (0, 0, 0, 0), turn_axes(dna, joint))
+            found[joint] = plain.values(shared(turn, share))
     return found
 
 

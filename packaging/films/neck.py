@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: MIT
+"""A head at its limits without and with neck poses, one picture.
+
+neck.py -- --extension ZIP --out FOLDER FILE.dna [--size PIXELS] [--samples N]
+
+Leaves FOLDER/neck.jpg: a row of the file as it is and a row of the file with the poses that
+neck_poses.py gives it, and FOLDER/poses.dna.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parent / "check" / "blender")]
+
+import bpy  # noqa: E402
+import closeups  # noqa: E402
+import demo  # noqa: E402
+import install_extension  # noqa: E402
+import neck_poses  # noqa: E402
+import scene as stage  # noqa: E402
+from compare import sheet  # noqa: E402
+from mathutils import Matrix, Vector  # noqa: E402
+
+SHOWN = ("left", "right", "up", "down", "tilt left")
+PLACE, TARGET, LENS = Vector((0.42, -0.85, 0.02)), Vector((0.0, 0.03, -0.115)), 100  # from the eyes
+
+
+def parse():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("face", type=Path)
+    parser.add_argument("--extension", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--size", type=int, default=320)
+    parser.add_argument("--samples", type=int, default=8, help="in each pixel")
+    return parser.parse_args(install_extension.arguments())
+
+
+def turn(controls, bone, angles):
+    """Turn a control bone by yaw, pitch and roll about the face's axes, radians."""
+    yaw, pitch, roll = angles
+    matrix = Matrix.Rotation(yaw, 3, "Z") @ Matrix.Rotation(-pitch, 3, "X")
+    matrix = matrix @ Matrix.Rotation(roll, 3, "Y")
+    item = controls.pose.bones[bone]
+    rest = item.bone.matrix_local.to_quaternion()
+    item.rotation_mode = "QUATERNION"
+    item.rotation_quaternion = rest.inverted() @ matrix.to_quaternion() @ rest
+
+
+def pictures(path, args):
+    """The files of a face, by what its head does."""
+    for item in list(bpy.data.objects):
+        bpy.data.objects.remove(item)
+    controls = demo.import_face(path)
+    collection = controls.users_collection[0]
+    stage.build(collection, strands=False)
+    scene = bpy.context.scene
+    scene.cycles.samples = args.samples
+    closeups.use_engine("cycles")
+    eyes = [closeups.middle(collection, name) for name in ("eyeLeft", "eyeRight")]
+    origin = sum(eyes, Vector()) / 2
+    camera = scene.camera
+    camera.location = origin + PLACE
+    stage.aim(camera, origin + TARGET)
+    camera.data.lens, camera.data.dof.use_dof = LENS, False
+    out = {}
+    for name in SHOWN:
+        for bone, angles in neck_poses.LIMITS[name].items():
+            turn(controls, bone, angles)
+        controls.update_tag()
+        bpy.context.view_layer.update()
+        out[name] = args.out / f"{path.stem}_{name}.png"
+        demo.still(out[name], 1, args.size)
+    return out
+
+
+def main():
+    args = parse()
+    args.out.mkdir(parents=True, exist_ok=True)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    install_extension.install(args.extension)
+    posed = args.out / "poses.dna"
+    neck_poses.add(args.face, posed)
+    textures = args.face.with_name(f"{args.face.stem}_textures")
+    if textures.is_dir():
+        shutil.copytree(textures, args.out / "poses_textures", dirs_exist_ok=True)
+    rows = {"as skinned": pictures(args.face, args), "with neck poses": pictures(posed, args)}
+    sheet(rows, args.size).save(args.out / "neck.jpg", quality=88)
+
+
+if __name__ == "__main__":
+    stage.end_with(main)
