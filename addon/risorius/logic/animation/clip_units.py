@@ -15,6 +15,10 @@ from ..base.sentences import told
 Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
+NECK = ("neck.yaw", "neck.pitch", "neck.roll")
+TARGET = ("eyes.x", "eyes.y", "eyes.z")  # where the gaze target stands, in its own axes
+TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
+BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # all that layers move
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
 
 

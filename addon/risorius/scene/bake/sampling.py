@@ -15,10 +15,10 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Quaternion
+from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..animation import layers
+from ..animation import layer_mixing, layers
 from ..base import compat, drivers, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
@@ -210,7 +210,7 @@ class _Reader:
         got.raw[number], turns = inputs.complete(seen, self.live, depsgraph, self.maximum, raw, own)
         got.turns.append(turns)
         got.places[number] = seen.matrix_world
-        self._read_control_bones(number, seen, own["head"])
+        self._read_control_bones(number, seen, own)
         if got.bones is not None:
             moved = self.rig.evaluated_get(depsgraph).pose.bones
             for name, values in got.bones.items():
@@ -223,9 +223,9 @@ class _Reader:
                     got.others[owner].setdefault(path, []).append(value)
 
     def _read_control_bones(
-        self, number: int, seen: ArmatureObject, head: Quaternion | None
+        self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Args: head  how it is turned with the layers, in the armature's axes; or None."""
+        """Args: own  how they are turned and moved with the layers."""
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -236,12 +236,17 @@ class _Reader:
                 if bone.constraints
                 else bone.matrix_basis
             )
-        if self.layered and head is not None and "head" in basis:
-            matrix = Matrix(basis["head"][number].tolist())
-            rest = self.controls.data.bones["head"].matrix_local.to_quaternion()
-            basis["head"][number] = Matrix.LocRotScale(
-                matrix.to_translation(), rest.inverted() @ head @ rest, matrix.to_scale()
-            )
+        for name in basis if self.layered else ():
+            matrix = Matrix(basis[name][number].tolist())
+            place, turn, scale = matrix.decompose()
+            if name in own.turns:
+                rest = self.controls.data.bones[name].matrix_local.to_quaternion()
+                turn = rest.inverted() @ own.turns[name] @ rest
+            elif name == "eyes" and own.target is not None:
+                place = own.target
+            else:
+                continue
+            basis[name][number] = Matrix.LocRotScale(place, turn, scale)
 
 
 def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
