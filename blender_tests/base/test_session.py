@@ -152,16 +152,16 @@ class _Holder:
 
 def test_blender_counts_one_reference_too_few_to_temporary_data():
     """Fails in the first Blender that counts well: the bound stays, and this says until where."""
-    ahead = scene.submodule("scene.frame.controls_ahead")
+    place = scene.submodule("scene.base.stage")
     lender = bpy.data.temp_data()
     lent, control = _Holder(lender.__enter__()), _Holder(object())
     also = [control.it]
     asked, right = sys.getrefcount(lent.it), sys.getrefcount(control.it)
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(lent.it))
     lender.__exit__(None, None, None)
-    too_few = bpy.app.version[:2] <= ahead.MISCOUNTED_UNTIL
-    assert right - asked == too_few, "see MISCOUNTED_UNTIL of controls_ahead.py"
-    stage = ahead._Stage([])
+    too_few = bpy.app.version[:2] <= place.MISCOUNTED_UNTIL
+    assert right - asked == too_few, "see MISCOUNTED_UNTIL of stage.py"
+    stage = place.Stage([])
     counted = sys.getrefcount(stage._file)
     stage.close()
     assert counted == right == 2 + len(also)

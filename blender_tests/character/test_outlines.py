@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Outlines of the control bones: beside the face, hidden without hiding keys, never in a scene."""
 
+import shutil
+
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from support import scene
+from support import past, scene
 
 
 @pytest.fixture
@@ -45,6 +47,33 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
         assert np.all(np.abs(drawn - (low + high) / 2) < room + np.ptp(drawn, axis=0)), name
     sides = [outline(controls, f"eye_{side}")[:, 0].mean() for side in "LR"]
     assert (sides[0] - sides[1]) * (left[0] - right[0]) > 0  # each on the side of its eye
+
+
+def test_outlines_of_an_older_file_move_beside_the_face(dna_file, tmp_path):
+    """A file of before saved them over the eyes."""
+    made = "4.2.23"
+    folder = shutil.copytree(past.DATA / made, tmp_path / made)
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "bones.blend"))
+    rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
+    controls = scene.controls(rig)
+    controls.data.pose_position = "REST"
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = controls
+
+    def over():
+        eyes = [np.array(controls.data.bones[f"eye_{s}"].head_local) for s in "LR"]
+        drawn = [outline(controls, name)[:, ::2] for name in ("head", "eye_L", "eye_R")]
+        return [
+            bool(np.all(d.min(axis=0) < e[::2]) and np.all(d.max(axis=0) > e[::2]))
+            for d in drawn
+            for e in eyes
+        ]
+
+    assert any(over())
+    assert bpy.ops.risorius.move_outlines() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert not any(over())
+    assert bpy.ops.risorius.move_outlines() == {"CANCELLED"}
 
 
 def test_appended_outlines_are_not_left_in_the_scene(rig, tmp_path):

@@ -21,7 +21,7 @@ MODES = {
     "mute": (lambda: bpy.ops.risorius.mute(kind="JOINTS"), "Muted"),
     "heat": (lambda: bpy.ops.risorius.heat(kind="POSE"), "Heat Map"),
     "baked": (bpy.ops.risorius.bake, "Baked"),
-    "board": (lambda: bpy.ops.risorius.lead(by="BOARD"), "The board leads"),
+    "board": (lambda: bpy.ops.risorius.lead(by="BOARD"), "The Board Leads"),
     "linked": (bpy.ops.risorius.link_sides, "Sides Linked"),
 }
 

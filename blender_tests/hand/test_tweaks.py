@@ -3,7 +3,9 @@
 
 import bpy
 import pytest
+from mathutils import Euler, Quaternion
 from support import scene
+from support.editors import editor
 from support.layout import drawn
 
 PREFIX = "CTRL_expressions."
@@ -204,6 +206,182 @@ def test_with_linked_sides_both_are_tweaked(dna_file):
     press_i(rig, LEFT)
     assert [shown(rig, 20, n) for n in (LEFT, RIGHT)] == pytest.approx([0.4, 0.4], abs=1e-5)
     assert [shown(rig, 5, n) for n in (LEFT, RIGHT)] == pytest.approx([0.0, 0.0], abs=1e-5)
+
+
+BONES = {
+    "head": ("rotation_quaternion", Quaternion((0.0, 0.0, 1.0), 0.3)),
+    "neck": ("rotation_euler", Euler((0.2, 0.0, 0.1))),
+    "eye_L": ("rotation_quaternion", Quaternion((1.0, 0.0, 0.0), 0.2)),
+    "eyes": ("location", (0.01, 0.0, 0.02)),
+}
+
+
+def pose_bone(rig, name):
+    return scene.controls(rig).pose.bones[name]
+
+
+def seen(rig, frame):
+    """All that the face takes: raw controls and turns of head and neck."""
+    go(rig, frame)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    controls = scene.controls(rig).evaluated_get(depsgraph)
+    live = scene.submodule("scene.character.runtime").of(rig)
+    raw, turns = scene.submodule("scene.frame.inputs").read_inputs(controls, live, depsgraph)
+    return [*raw, *(x for name in ("head", "neck") for x in turns.get(name, Quaternion()))]
+
+
+def turn(rig, name):
+    """Move a control bone as a hand does; returns the property and what it stands at."""
+    bone, (channel, value) = pose_bone(rig, name), BONES[name]
+    if channel == "rotation_euler":
+        bone.rotation_mode = "XYZ"
+    setattr(bone, channel, value)
+    scene.update(scene.controls(rig))
+    return channel
+
+
+@pytest.fixture
+def turning(dna_file):
+    """Keys of the head at 1 and 40, the neck in Euler angles, and a tweak from 10 to 30."""
+    rig = scene.load(dna_file)
+    pose_bone(rig, "neck").rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.1), (40, 0.3)):
+        pose_bone(rig, "head").rotation_quaternion = Quaternion((1.0, 0.0, 0.0), angle)
+        pose_bone(rig, "head").keyframe_insert("rotation_quaternion", frame=frame)
+    go(rig, 20)
+    assert bpy.ops.risorius.tweak(first=10, last=30, fade=4) == {"FINISHED"}
+    return rig
+
+
+@pytest.mark.parametrize("keyed", [True, False])
+def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
+    """By I and auto-key at the frame, without a key when it changes; the bake has them too."""
+    before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
+    stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
+    go(turning, 20)
+    turn(turning, "eyes")
+    asked_gaze = seen_now(turning)
+    for name in BONES:
+        channel = turn(turning, name)
+    asked = seen_now(turning)
+    assert asked != pytest.approx(asked_gaze, abs=1e-3)
+    for name in BONES if keyed else ():
+        pose_bone(turning, name).keyframe_insert(BONES[name][0], frame=20)
+        bpy.context.view_layer.update()
+    assert below(turning) == before
+    assert seen(turning, 20) == pytest.approx(asked, abs=1e-4)
+    assert channel == "location"
+    for name, place in stood.items():
+        assert tuple(getattr(pose_bone(turning, name), BONES[name][0])) == pytest.approx(place)
+    assert {f: seen(turning, f) for f in base} == {f: pytest.approx(v) for f, v in base.items()}
+    assert bpy.ops.risorius.tweak(enable=False) == {"FINISHED"}
+    assert below(turning) == before
+    if keyed:
+        assert bpy.ops.risorius.bake(start=19, end=21) == {"FINISHED"}
+        assert seen(turning, 20) == pytest.approx(asked, abs=1e-4)
+
+
+def seen_now(rig):
+    return seen(rig, bpy.context.scene.frame_current)
+
+
+def test_a_turn_too_far_for_the_fade_is_told_and_put_back(turning):
+    guard = scene.submodule("scene.animation.tweak_guard")
+    before, base = below(turning), seen(turning, 11)
+    bone = pose_bone(turning, "head")
+    bone.rotation_quaternion = Quaternion((0.0, 0.0, 1.0), 1.5)
+    bone.keyframe_insert("rotation_quaternion", frame=11)
+    bpy.context.view_layer.update()
+    assert below(turning) == before
+    assert seen_now(turning) == pytest.approx(base, abs=1e-6)
+    assert "only 25 %" in guard.trouble(scene.controls(turning))
+
+
+def test_key_all_and_whole_character_and_keys_in_channels_go_into_the_tweak(turning):
+    """A key without a move holds the tweak as it is there."""
+    controls, before = scene.controls(turning), below(turning)
+    turn(turning, "head")
+    assert bpy.ops.risorius.key() == {"FINISHED"}
+    turned = seen(turning, 20)
+    bpy.context.view_layer.objects.active = controls
+    bpy.ops.object.mode_set(mode="POSE")
+    go(turning, 22)
+    held, frame = seen_now(turning), 22
+    scene.set_controls(turning, jawOpen=0.5)
+    with editor("VIEW_3D"):
+        bpy.ops.anim.keyframe_insert_by_name(type="WholeCharacter")
+    bpy.context.view_layer.update()
+    assert below(turning) == before
+    assert shown(turning, frame) == pytest.approx(0.5, abs=1e-4)
+    assert seen(turning, frame)[-8:] == pytest.approx(held[-8:], abs=1e-4)
+    scene.submodule("scene.base.compat").select_bone(pose_bone(turning, "head"))
+    go(turning, 24)
+    with editor("GRAPH_EDITOR"):
+        bpy.ops.graph.keyframe_insert(type="ALL")
+    bpy.context.view_layer.update()
+    assert below(turning) == before
+    layer = scene.submodule("scene.animation.layers").of(controls)[0]
+    curves = scene.submodule("scene.base.compat").curves_for(layer.action, controls)
+    frames = {k.co.x for c in curves if "head" in c.data_path for k in c.keyframe_points}
+    assert frames == {10, 20, 22, 24, 30}
+    assert seen(turning, 20)[-8:] == pytest.approx(turned[-8:], abs=1e-4)
+
+
+def test_pasted_keys_go_into_the_tweak_and_moved_ones_stay(rig):
+    """Where keys are pasted at several frames, each is a tweak of its frame."""
+    before = below(rig)
+    curve = scene.curves(scene.controls(rig))[0]
+    for point in curve.keyframe_points:
+        point.select_control_point = point.co.x < 20
+    go(rig, 14)  # the key at 1 comes to 14, the one at 15 to 28
+    with editor("GRAPH_EDITOR"):
+        assert bpy.ops.graph.copy() == {"FINISHED"}
+        assert bpy.ops.graph.paste(offset="START") == {"FINISHED"}
+    action_of(rig).update_tag()
+    bpy.context.view_layer.update()
+    assert below(rig) == before
+    assert [shown(rig, f) for f in (14, 28)] == pytest.approx([0.2, 0.3], abs=1e-4)
+    curve = scene.curves(scene.controls(rig))[0]
+    curve.keyframe_points[1].co.y = 0.9
+    action_of(rig).update_tag()
+    bpy.context.view_layer.update()
+    go(rig, 20)
+    assert below(rig) != before
+
+
+def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
+    """The strip alone, and an action that is added above it."""
+    controls = scene.controls(rig)
+    scene.submodule("scene.animation.tweaks").end(controls)
+    data = controls.animation_data
+    strip, data.action = data.nla_tracks.new().strips.new("Take", 1, data.action), None
+    strip.extrapolation = "HOLD"
+    scene.set_controls(rig, mouthCornerPullR=0.2)
+    for blend, frame in (("REPLACE", 20), ("ADD", 24)):
+        if blend == "ADD":
+            action = bpy.data.actions.new("Above")
+            scene.submodule("scene.base.compat").add_curves(action, controls)
+            data.action, data.action_blend_type = action, blend
+            if hasattr(data, "action_slot") and data.action_slot is None:
+                data.action_slot = action.slots[0]
+        go(rig, frame)
+        assert bpy.ops.risorius.tweak(first=10, last=30, fade=4) == {"FINISHED"}
+        base = {f: (shown(rig, f), shown(rig, f, LEFT)) for f in (5, 35)}
+        before, left = below(rig), shown(rig, frame, LEFT) + 0.4
+        scene.set_controls(rig, mouthCornerPullL=0.4)
+        ask(rig, 0.8)
+        go(rig, frame + 1)
+        assert shown(rig, frame) == pytest.approx(0.8, abs=1e-4), blend
+        assert shown(rig, frame, LEFT) == pytest.approx(left, abs=1e-4)
+        ask(rig, 0.6)
+        press_i(rig, frame=frame)
+        assert below(rig) == before, blend
+        assert shown(rig, frame) == pytest.approx(0.6, abs=1e-4), blend
+        assert shown(rig, frame, RIGHT) == pytest.approx(0.2, abs=1e-6)
+        assert {f: (shown(rig, f), shown(rig, f, LEFT)) for f in (5, 35)} == {
+            f: pytest.approx(pair, abs=1e-6) for f, pair in base.items()
+        }
+        assert bpy.ops.risorius.tweak(enable=False) == {"FINISHED"}
 
 
 def test_the_range_that_is_proposed_lies_around_the_frame(rig):

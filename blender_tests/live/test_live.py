@@ -476,9 +476,9 @@ def test_the_panel_says_what_comes(dna_file, port):
     while "Late" not in words and monotonic() < ends:
         sleep(0.01)
         words = drawn()
-    for part in ("iPhone: 2 a second", "ms ago", "Recording: 2 faces", "Late, left out: 1", "Bob"):
+    for part in ("iPhone: 2 a second", "ms ago", "Recording: 2 faces", "Late, Left Out: 1", "Bob"):
         assert part in words
-    assert "Packets refused: 1 | packet version 1, 2, 5 or 6 was" in words  # and on, in more lines
+    assert "Packets Refused: 1 | packet version 1, 2, 5 or 6 was" in words  # and on, in more lines
     assert bpy.ops.risorius.live_subject(name="Bob") == {"FINISHED"}
     assert "Bob: 1 a second" in drawn()
 

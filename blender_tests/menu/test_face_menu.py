@@ -53,17 +53,15 @@ class Menus(Recorder):
 def found():
     """What the header leads to: paths as the search shows them, and names of operators."""
     layout = Menus()
-    bpy.types.RISORIUS_MT_face.draw(SimpleNamespace(layout=layout), bpy.context)
+    draw = scene.submodule("ui.menu.face_menu").draw_header
+    assert draw in bpy.types.VIEW3D_MT_editor_menus._dyn_ui_initialize()
+    draw(SimpleNamespace(layout=layout), bpy.context)
     return layout.paths, {name.partition(".")[2] for name in layout.operators}
 
 
 def is_in_header():
     """Whether the header shows the menu now."""
-    layout = Menus()
-    draw = scene.submodule("ui.menu.face_menu").draw_header
-    assert draw in bpy.types.VIEW3D_MT_editor_menus._dyn_ui_initialize()
-    draw(SimpleNamespace(layout=layout), bpy.context)
-    return bool(layout.paths)
+    return bool(found()[0])
 
 
 @pytest.fixture
@@ -79,17 +77,23 @@ def test_search_finds_the_face_by_the_words_of_animators(rig):
         *("expressions", "layer", "live capture", "eyes follow", "copy left to right"),
     ):
         assert any(words in path.lower() for path in paths), words
-    assert "Keys > Key All" in paths
+    assert all("risorius" in path.lower() for path in paths)
+    assert "Face (Risorius) > Keys > Key All" in paths
     ours = {name for name in dir(bpy.ops.risorius) if not name.startswith("_")}
     assert ours - operators - ELSEWHERE == set()
     assert ELSEWHERE - ours == set()
     for name in operators & ours:  # or the search would leave them out
         assert "INTERNAL" not in getattr(bpy.ops.risorius, name).bl_options, name
+    keymap = bpy.context.window_manager.keyconfigs.user.keymaps.new("3D View")
+    for name in operators & ours:  # a shortcut can be given, and shows what it is of
+        item = keymap.keymap_items.new(f"risorius.{name}", "F", "PRESS", ctrl=True, alt=True)
+        assert item.name == getattr(bpy.ops.risorius, name).get_rna_type().name, name
+        keymap.keymap_items.remove(item)
 
 
 def test_the_menu_stands_in_object_and_pose_mode_and_without_a_face(dna_file):
     assert is_in_header()
-    assert "Character > Add a Face > Face" in found()[0]
+    assert "Face (Risorius) > Character > Add a Face > Face" in found()[0]
     rig = scene.load(dna_file)
     controls = scene.controls(rig)
     bpy.context.view_layer.objects.active = controls
@@ -105,5 +109,5 @@ def test_the_menu_stands_in_object_and_pose_mode_and_without_a_face(dna_file):
 def test_without_the_native_module_the_menu_leads_to_the_preferences(monkeypatch):
     menu = scene.submodule("ui.menu.face_menu")
     monkeypatch.setattr(menu.native, "problem", lambda: "It is missing.")
-    assert "Risorius > Preferences" in found()[0]
+    assert "Face (Risorius) > Risorius > Preferences" in found()[0]
     assert "reset" not in found()[1]

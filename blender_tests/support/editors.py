@@ -1,17 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's own animation editors show."""
+"""What Blender's own animation editors show, and what is done in them."""
+
+from contextlib import contextmanager
 
 import bpy
 
 
-def seen_paths():
-    """Data paths of the F-curves that a graph editor with its own settings shows now."""
+@contextmanager
+def editor(kind):
+    """In this block operators run in an editor. Args: kind  as Area.type."""
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
-    before, area.type = area.type, "GRAPH_EDITOR"
+    before, area.type = area.type, kind
     bpy.context.view_layer.update()
     region = next(r for r in area.regions if r.type == "WINDOW")
-    with bpy.context.temp_override(window=window, area=area, region=region):
-        found = {c.data_path for c in bpy.context.visible_fcurves or ()}
-    area.type = before
-    return found
+    try:
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            yield
+    finally:
+        area.type = before
+
+
+def seen_paths():
+    """Data paths of the F-curves that a graph editor with its own settings shows now."""
+    with editor("GRAPH_EDITOR"):
+        return {c.data_path for c in bpy.context.visible_fcurves or ()}

@@ -15,10 +15,10 @@ from ..base.sentences import told
 Float = NDArray[np.float64]
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 NECK = ("neck.yaw", "neck.pitch", "neck.roll")
-TURNED = {"head": HEAD, "neck": NECK}
-"""Control bones that layers mix -> their angles, in the order of the mixer."""
-ANGLES = (*HEAD, *NECK)
 EYES = {"L": ("eyeL.yaw", "eyeL.pitch"), "R": ("eyeR.yaw", "eyeR.pitch")}
+TARGET = ("eyes.x", "eyes.y", "eyes.z")  # where the gaze target stands, in its own axes
+TURNS = {"head": HEAD, "neck": NECK, **{f"eye_{side}": names for side, names in EYES.items()}}
+BONES = (*(name for names in TURNS.values() for name in names), *TARGET)  # all that layers move
 LAST_FRAME = 1_048_574  # Blender's own limit of a scene
 
 
@@ -157,8 +157,7 @@ def keys_of(
             )
         )
     keys = Keys()
-    turned = [*TURNED.values(), *EYES.values()]
-    angles = {name for group in turned for name in group}
+    angles = {name for group in TURNS.values() for name in group}
     for name, values in zip(names, curves, strict=True):
         if name in sliders:
             curve = _curve(sliders[name], frames, values, timing, keys)
@@ -194,8 +193,9 @@ def _add_turns(
     with_eyes: bool,
 ) -> None:
     rows = dict(zip(names, curves, strict=True))
-    groups = {**TURNED, **({f"eye_{s}": n for s, n in EYES.items()} if with_eyes else {})}
-    for bone, group in groups.items():
+    for bone, group in TURNS.items():
+        if bone.startswith("eye_") and not with_eyes:
+            continue
         if not len(frames) or not any(name in rows for name in group):
             continue
         nothing = np.zeros(len(frames), np.float32)

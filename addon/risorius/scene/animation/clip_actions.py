@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -249,7 +249,7 @@ def _add_turn(
     """The rotation of a bone, in the way that the bone is turned."""
     own = clip_units.near_signs(_into_bone(bone, turns))
     path = f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{rotation_path(bone)}'
-    for index, values in enumerate(_as_rotation(bone, own).T):
+    for index, values in enumerate(_as_rotation(bone.rotation_mode, own).T):
         _fill(_new(bag, group, path, index), frames, values, fitter)
 
 
@@ -265,17 +265,17 @@ def _into_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
     return clip_units.multiply(clip_units.multiply(back, turns), rest)
 
 
-def _as_rotation(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[n, 3 or 4] as the bone's rotation mode writes it."""
-    if bone.rotation_mode == "QUATERNION":
+def _as_rotation(mode: str, turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """float64[n, 3 or 4] as a rotation mode writes it."""
+    if mode == "QUATERNION":
         return turns
-    if bone.rotation_mode == "AXIS_ANGLE":
+    if mode == "AXIS_ANGLE":
         pairs = [Quaternion(turn).to_axis_angle() for turn in turns]
         return np.array([(angle, *axis) for axis, angle in pairs])
     eulers = []
     for turn in turns:
         before = (eulers[-1],) if eulers else ()
-        eulers.append(Quaternion(turn).to_euler(bone.rotation_mode, *before))
+        eulers.append(Quaternion(turn).to_euler(mode, *before))
     return np.array([tuple(e) for e in eulers])
 
 
@@ -340,8 +340,8 @@ def clip_of_action(
         rate: frames per second of the scene; frame 0 is second 0 of the clip.
 
     Returns:
-        risorius.Clip of the sliders that it moves, by their property names, and "head.yaw" and its
-        like where it turns the bones of head and neck. See dna_names.
+        risorius.Clip of the sliders that it moves, by their property names, and the names of
+        `clip_units.BONES` where it turns control bones or moves the gaze target. See dna_names.
     """
     frames = np.asarray(frames, np.float64)
     curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
@@ -351,11 +351,16 @@ def clip_of_action(
         if curve is not None:
             found.append(label)
             rows.append(sampled(curve, frames))
-    for bone, angles in clip_units.TURNED.items():
-        turned = _turn_rows(controls, bone, curves, frames)
-        if turned is not None:
+    for name, angles in clip_units.TURNS.items():
+        bone = controls.pose.bones.get(name)
+        way = turning(bone, curves)
+        if bone is not None and way is not None:
             found += angles
-            rows += list(turned)
+            rows += list(angles_in_armature(bone, way.mode, way.values(frames)).T[: len(angles)])
+    target = [curves.get(('pose.bones["eyes"].location', axis)) for axis in range(3)]
+    if any(target):
+        found += clip_units.TARGET
+        rows += _rows(target, (0.0, 0.0, 0.0), frames)
     return native.module().Clip(
         found,
         np.array(rows, np.float32).reshape(len(rows), len(frames)),
@@ -418,33 +423,97 @@ def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.
     ]
 
 
-def _turn_rows(
-    controls: ArmatureObject,
-    name: str,
-    curves: Mapping[tuple[str, int], bpy.types.FCurve],
-    frames: NDArray[np.float64],
-) -> NDArray[np.float64] | None:
-    """float64[3, n]: how the bone of the head or the neck is turned, or None where it is not."""
-    bone = controls.pose.bones.get(name)
+@dataclass(frozen=True)
+class Turning:
+    """What turns a control bone in an action.
+
+    Attributes:
+        mode: as PoseBone.rotation_mode.
+        path: of the property that turns it in this mode.
+        curves: one of each number of it, None where there is none.
+        rest: its numbers for a bone that is not turned.
+    """
+
+    mode: str
+    path: str
+    curves: list[bpy.types.FCurve | None]
+    rest: tuple[float, ...]
+
+    def values(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+        """float64[frames, 3 or 4]: the property at frames; without a curve it rests."""
+        return np.stack(_rows(self.curves, self.rest, frames), axis=1)
+
+
+def turning(
+    bone: bpy.types.PoseBone | None, curves: Mapping[tuple[str, int], bpy.types.FCurve]
+) -> Turning | None:
+    """The curves that turn a control bone, or None where there are none.
+
+    Args:
+        bone: of the control armature.
+        curves: of an action, by data path and index.
+    """
+    # Its own way first: an action of another face may turn the bone in another way.
     if bone is None:
         return None
-    # Its own way first: an action of another face may turn the head in another way.
     for mode in (bone.rotation_mode, "QUATERNION", "XYZ", "AXIS_ANGLE"):
-        path = f'pose.bones["{name}"].{_ROTATIONS.get(mode, "rotation_euler")}'
-        rest = {"QUATERNION": (1.0, 0.0, 0.0, 0.0), "AXIS_ANGLE": (0.0, 0.0, 1.0, 0.0)}.get(
-            mode, (0.0, 0.0, 0.0)
-        )
-        found = [curves.get((path, i)) for i in range(len(rest))]
-        if any(found):
-            break
-    else:
-        return None
-    values = [
+        way = turning_in(bone, mode, curves)
+        if any(way.curves):
+            return way
+    return None
+
+
+def turning_in(
+    bone: bpy.types.PoseBone, mode: str, curves: Mapping[tuple[str, int], bpy.types.FCurve]
+) -> Turning:
+    """The curves that turn a control bone in one mode, or none.
+
+    Args:
+        bone: of the control armature.
+        mode: as PoseBone.rotation_mode.
+        curves: of an action, by data path and index.
+    """
+    name = bpy.utils.escape_identifier(bone.name)
+    path = f'pose.bones["{name}"].{_ROTATIONS.get(mode, "rotation_euler")}'
+    rests = {"QUATERNION": (1.0, 0.0, 0.0, 0.0), "AXIS_ANGLE": (0.0, 0.0, 1.0, 0.0)}
+    rest = rests.get(mode, (0.0, 0.0, 0.0))
+    return Turning(mode, path, [curves.get((path, i)) for i in range(len(rest))], rest)
+
+
+def _rows(
+    curves: Sequence[bpy.types.FCurve | None], rest: Sequence[float], frames: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """float64[frames] of each channel of a property; one without a curve rests."""
+    return [
         np.full(len(frames), still) if curve is None else sampled(curve, frames)
-        for curve, still in zip(found, rest, strict=True)
+        for curve, still in zip(curves, rest, strict=True)
     ]
-    turns = _from_bone(bone, _from_rotation(mode, np.stack(values, axis=1)))
-    return clip_units.angles_of(turns).T
+
+
+def angles_in_armature(
+    bone: bpy.types.PoseBone, mode: str, values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """float64[n, 3]: yaw, pitch and roll in the armature's axes, radians.
+
+    Args:
+        bone: a control bone.
+        mode: how it is turned, as PoseBone.rotation_mode.
+        values: float64[n, 3 or 4], the property that turns it in this mode.
+    """
+    return clip_units.angles_of(_from_bone(bone, _from_rotation(mode, values)))
+
+
+def rotation_of(
+    bone: bpy.types.PoseBone, mode: str, angles: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The inverse of `angles_in_armature`.
+
+    Args:
+        bone: a control bone.
+        mode: how it is turned, as PoseBone.rotation_mode.
+        angles: float64[n, 3], radians.
+    """
+    return _as_rotation(mode, _into_bone(bone, clip_units.quaternions(angles)))
 
 
 def _from_rotation(mode: str, values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -198,7 +198,7 @@ def changed(
 ) -> int:
     """Key what an edit changed at the current frame, if Blender's settings say so.
 
-    While a tweak is on, sliders go into that instead.
+    While a tweak is on, sliders and bones go into that instead.
 
     Args:
         context: has the settings and the frame.
@@ -211,7 +211,7 @@ def changed(
     """
     rules, controls = rules_of(context), parts.controls_there(rig)
     if tweaks.of(controls) is not None:
-        return tweaks.take(controls, labels, context.scene.frame_current_final)
+        return tweaks.take(controls, labels, context.scene.frame_current_final, bones)
     if not rules.insert:
         return 0
     return insert(controls, labels, bones, context.scene.frame_current, rules)
@@ -233,7 +233,8 @@ def key(
     """
     controls, rules = parts.controls_there(rig), rules_of(context, auto=False)
     if tweaks.of(controls) is not None:
-        return tweaks.take(controls, labels, context.scene.frame_current_final)
+        frame = context.scene.frame_current_final
+        return tweaks.take(controls, labels, frame, bones, held=True)
     return insert(controls, labels, bones, context.scene.frame_current, rules)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The layers of a character, compiled to native curves and mixed over its sliders.
+"""The layers of a character, compiled to native curves and mixed over its sliders and bones.
 
 What is compiled is kept by the character and compared with what it was made of: a frame costs one
 look at the settings and one native call, and nothing at all without layers. No Blender object is
@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import bpy
 import numpy as np
-from mathutils import Quaternion
+from mathutils import Quaternion, Vector
 from numpy.typing import NDArray
 
 from ... import native
@@ -28,6 +28,7 @@ from ..character import runtime
 from . import clip_actions, layers
 from .layer_properties import RISORIUS_PG_layer
 
+TURNED = tuple(clip_logic.TURNS)  # the control bones whose turns are mixed
 _OF_SOURCE = (
     "kind",
     "expression",
@@ -46,10 +47,21 @@ _MOST_FIRED = 4096
 _IDLE_LOOP = 120.0  # seconds before idle life without a length comes again
 
 
-Turns = Mapping[str, Quaternion | None]
-_TURNED = tuple(clip_logic.TURNED)
 Times = dict[str, object]  # keyword arguments of risorius.Layer that say when it plays
 Source: TypeAlias = "tuple[native.Clip | dict[str, float], Times]"
+
+
+@dataclass
+class Bones:
+    """What the control bones ask for.
+
+    Attributes:
+        turns: of "head", "neck", "eye_L", "eye_R" in the armature's axes, without those that rest.
+        target: how far the gaze target was moved, in its own axes; None where it rests.
+    """
+
+    turns: dict[str, Quaternion] = field(default_factory=dict)
+    target: Vector | None = None
 
 
 @dataclass
@@ -66,7 +78,7 @@ class Stack:
 
     Attributes:
         made_of: what they were compiled from.
-        mixer: risorius.Mixer of the character's labels, then the angles of head and neck.
+        mixer: risorius.Mixer of the character's labels, then of `clip_units.BONES`.
         layers: risorius.Layer, bottom to top, at full weight.
         places: of each the place among the settings.
         weights: of all settings by place, as the mixer has them now.
@@ -109,27 +121,26 @@ def mix(
     seen: ArmatureObject,
     live: runtime.Runtime,
     raw: NDArray[np.float32],
-    own: Turns,
+    bones: Bones,
     depsgraph: Depsgraph,
     maximum: float,
-) -> tuple[NDArray[np.float32], Turns]:
-    """Mix the layers of a character over its sliders and the bones of its head and neck.
+) -> tuple[NDArray[np.float32], Bones]:
+    """Mix the layers of a character over its sliders and its control bones.
 
     Args:
         seen: the evaluated control armature; its layers have the weights of this frame.
         live: the character's Runtime.
         raw: float32[R], the sliders.
-        own: "head" and "neck" -> Quaternion in the armature's axes by which the bone is turned, or
-            None.
+        bones: how the control bones are turned and moved.
         depsgraph: its scene gives the time.
         maximum: of the sliders.
 
     Returns:
-        float32[R], and the turns as `own`.
+        float32[R], and what the control bones ask for with the layers.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:
-        return raw, own  # baked controls have them in their action
+        return raw, bones  # baked controls have them in their action
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
     # Where there are not as many, one was added and not evaluated since.
@@ -137,20 +148,37 @@ def mix(
     weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
     if stack.weights != weights:
         _set_weights(stack, weights)
-    base = np.zeros(len(raw) + len(clip_logic.ANGLES), np.float32)
-    base[: len(raw)] = raw
-    rows = {name: slice(len(raw) + 3 * i, len(raw) + 3 * i + 3) for i, name in enumerate(_TURNED)}
-    for name, row in rows.items():
-        turn = own.get(name)
-        if turn is not None:
-            base[row] = clip_logic.angles_of(np.array(turn))
+    base = np.concatenate([raw, _numbers(bones)])
     out = stack.mixer.evaluate(scene.frame_current_final / clip_actions.frame_rate(scene), base)
-    mixed = dict(own)
-    for name, row in rows.items():
-        if not np.array_equal(out[row], base[row]):
-            angles = out[row][None].astype(np.float64)
-            mixed[name] = Quaternion(clip_logic.quaternions(angles)[0])
-    return np.ascontiguousarray(out[: len(raw)]), mixed
+    return np.ascontiguousarray(out[: len(raw)]), _changed(bones, base[len(raw) :], out[len(raw) :])
+
+
+def _numbers(bones: Bones) -> NDArray[np.float32]:
+    """float32[BONES]: what the mixer has after the sliders."""
+    found: list[float] = []
+    for name, group in clip_logic.TURNS.items():
+        turn = bones.turns.get(name)
+        angles = clip_logic.angles_of(np.array(turn)).tolist() if turn is not None else [0.0] * 3
+        found += angles[: len(group)]
+    found += [0.0] * 3 if bones.target is None else bones.target[:]
+    return np.array(found, np.float32)
+
+
+def _changed(bones: Bones, before: NDArray[np.float32], after: NDArray[np.float32]) -> Bones:
+    """What the control bones ask for with the layers; what no layer moves stays to the bit."""
+    if np.array_equal(before, after):
+        return bones
+    turns, target, at = dict(bones.turns), bones.target, 0
+    for name, group in clip_logic.TURNS.items():
+        rows = slice(at, at + len(group))
+        at += len(group)
+        if not np.array_equal(before[rows], after[rows]):
+            turns[name] = Quaternion(
+                clip_logic.quaternions(after[None, rows].astype(np.float64))[0]
+            )
+    if not np.array_equal(before[at:], after[at:]):
+        target = Vector(after[at:].tolist())
+    return Bones(turns, target)
 
 
 def compiled(
@@ -217,7 +245,7 @@ def _compile(
 
 def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> native.Mixer:
     return native.module().Mixer(
-        [*live.labels, *clip_logic.ANGLES],
+        [*live.labels, *clip_logic.BONES],
         ranges={n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)},
         exclusives="default" if controls.risorius_layer_rules else None,
         max_fired=_MOST_FIRED,
@@ -296,19 +324,19 @@ def native_layer(
 
 def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32]:
     allowed = allowed_names(live, layer)
-    names = [*live.labels, *clip_logic.ANGLES]
+    names = [*live.labels, *clip_logic.BONES]
     return np.array([name in allowed for name in names], np.float32)
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """What a layer may move: sliders, and the angles of head and neck, of the neck's region.
+    """What a layer may move: sliders, and the numbers of control bones, `clip_units.BONES`.
 
     Args:
         live: Runtime of the character, for the names of its sliders.
         layer: settings with the regions and the patterns of names.
     """
     chosen = {region.lower() for region in layer.regions}
-    labels = [*live.labels, *clip_logic.ANGLES]
+    labels = [*live.labels, *clip_logic.BONES]
     return set(logic.masked(labels, native.regions(), chosen, layer.controls))
 
 

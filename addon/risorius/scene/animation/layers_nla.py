@@ -181,7 +181,7 @@ def _action_of(
     if layer.kind == "ACTION":
         first, last = layer.action.frame_range
         names = layer_mixing.allowed_names(live, layer)
-        allowed = {n if n in clip_logic.ANGLES else parts.property_path(n) for n in names}
+        allowed = {n if n in clip_logic.BONES else parts.property_path(n) for n in names}
         return _masked(controls, layer, allowed), not last > first
     made = layer_mixing.native_layer(controls, live, layer, clip_actions.frame_rate(scene))
     clip = made.clip()
@@ -211,7 +211,9 @@ def _masked(
 
 def _is_left_out(path: str, allowed: Set[str]) -> bool:
     """Whether a layer does not move what an F-curve moves."""
-    for bone, angles in clip_logic.TURNED.items():
+    for bone, names in clip_logic.TURNS.items():
         if path.startswith(f'pose.bones["{bone}"].rotation_'):
-            return not allowed & set(angles)
+            return not allowed & set(names)
+    if path == 'pose.bones["eyes"].location':
+        return not allowed & set(clip_logic.TARGET)
     return path not in allowed

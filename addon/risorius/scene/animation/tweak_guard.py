@@ -2,9 +2,10 @@
 """What Blender's own buttons do to a face while a tweak is on goes into the tweak too.
 
 Blender knows no tweaks: its keys land in the action that the face plays. A copy of that action is
-kept in the file while a tweak is on, so that undo and redo have it; a key that landed in the action
-at the current frame is taken out again, and its value goes into the tweak. Sliders and handles that
-were moved without a key go into the tweak when the frame changes. Other edits of the action stay.
+kept in the file while a tweak is on, so that undo and redo have it; keys that came into the action
+since are taken out again, and their values go into the tweak. Sliders, bones and handles that were
+moved without a key go into the tweak when the frame changes. Other edits of the action stay: keys
+that were moved or deleted, and keys of what no tweak holds, as the place of the whole face.
 """
 
 from __future__ import annotations
@@ -25,6 +26,18 @@ _KEPT = "risorius_tweak_kept"  # on the same: its copy, as it was before
 _NEAR = 1e-5  # values that are the same
 _AT = 1e-3  # frames that are the same
 _ARRAYS = ("co", "handle_left", "handle_right")
+_OF_STRIPS = (
+    "name",
+    "frame_start",
+    "frame_end",
+    "scale",
+    "repeat",
+    "influence",
+    "blend_type",
+    "extrapolation",
+    "mute",
+)
+_CHANNELS = ("location", "rotation_", "scale")
 _KINDS = ("type", "interpolation", "handle_left_type", "handle_right_type")
 
 CurveName = tuple[str, int]  # data path and index
@@ -33,23 +46,38 @@ Curves = dict[CurveName, bpy.types.FCurve]
 
 @dataclass
 class _Hand:
-    """Sliders that differ from the keys below and have no key.
+    """What differs from the keys below and has no key there.
 
     Attributes:
         frame: of the scene.
-        sliders: values by their names.
-        places: of handles of the face board, by their bones.
+        stand: what was moved, and where it stands.
+        held: whether a key asked for it: it gets one in the tweak even where it does not differ.
     """
 
     frame: float
-    sliders: dict[str, float] = field(default_factory=dict)
-    places: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    stand: tweaks.Stand = field(default_factory=tweaks.Stand)
+    held: bool = False
+
+
+@dataclass
+class _Below:
+    """What Blender was asked for: what stands below a tweak beside strips.
+
+    Attributes:
+        frame: of the scene.
+        strips: what they were.
+        stand: what stands there.
+    """
+
+    frame: float
+    strips: tuple[object, ...]
+    stand: tweaks.Stand
 
 
 # Session uid of a control armature -> what its user moved.
 _hands: dict[int, _Hand] = session.table("tweak_guard.hands", ("undo", "load"))
-# Session uids of those looked at since load or undo.
-_known: set[int] = session.keep("tweak_guard.known", set, ("undo", "load"))
+# Session uid of those looked at since load or undo -> what stands below a tweak beside strips.
+_known: dict[int, _Below | None] = session.table("tweak_guard.known", ("undo", "load"))
 # Session uid of one -> why its last key went nowhere.
 _troubles: dict[int, str] = session.table("tweak_guard.troubles", ("undo", "load"))
 
@@ -116,13 +144,43 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
         _hands.pop(uid, None)
         return
     if edited or uid not in _known:
-        _known.add(uid)
-        _take_keys(controls, tweak, frame)
+        _known[uid] = None
+        if _is_dragging():  # what is dragged must not go: keys are looked at when it ends
+            del _known[uid]
+        else:
+            _take_keys(controls, tweak, frame)
     hand = _moved(controls, tweak, frame)
     if hand is None:
         _hands.pop(uid, None)
     else:
         _hands[uid] = hand
+
+
+def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
+    """What stands below; while nothing but the controls is edited Blender is asked once."""
+    if not tweaks.is_mixed(controls):
+        return tweaks.below_at(controls, tweak, frame)
+    uid, strips = controls.session_uid, _strips(controls)
+    known = _known.get(uid)
+    if known is None or (known.frame, known.strips) != (frame, strips):
+        known = _Below(frame, strips, tweaks.below_at(controls, tweak, frame))
+        if uid in _known:
+            _known[uid] = known
+    return known.stand
+
+
+def _strips(controls: ArmatureObject) -> tuple[object, ...]:
+    """What the strips of a face are, and how its action plays above them."""
+    data = controls.animation_data
+    assert data is not None
+    own = (data.use_nla, data.action_influence, data.action_blend_type)
+    tracks = [(t.mute, t.is_solo, len(t.strips)) for t in data.nla_tracks]
+    strips = [
+        tuple(getattr(strip, name) for name in _OF_STRIPS)
+        for track in data.nla_tracks
+        for strip in track.strips
+    ]
+    return (*own, *tracks, *strips)
 
 
 def settle(controls: ArmatureObject) -> None:
@@ -136,17 +194,34 @@ def settle(controls: ArmatureObject) -> None:
         _take(controls, hand)
 
 
-def _take(controls: ArmatureObject, hand: _Hand) -> None:
-    face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls)
-    for label, value in hand.sliders.items():
-        face[label] = value
-    if rig is not None and hand.places:
-        board.put_places(controls, runtime.there(rig), hand.places)
+def _is_dragging() -> bool:
+    """Whether keys or bones are being dragged in a window."""
+    windows = bpy.data.window_managers[0].windows if len(bpy.data.window_managers) else ()
+    running = (op.bl_idname for w in windows for op in getattr(w, "modal_operators", ()))
+    return any(name.startswith("TRANSFORM_OT") for name in running)
+
+
+def _take(controls: ArmatureObject, hand: _Hand, old: tweaks.Curves | None = None) -> None:
+    tweak, stand = tweaks.of(controls), hand.stand
+    assert tweak is not None
+    tweaks.put(controls, stand)
+    labels, bones = list(stand.sliders), list(stand.bones)
     try:
-        tweaks.take(controls, list(hand.sliders), hand.frame)
+        tweaks.take(controls, labels, hand.frame, bones, hand.held, old)
         _troubles.pop(controls.session_uid, None)
     except FaceError as error:
+        below = tweaks.below_at(controls, tweak, hand.frame)
+        tweaks.put(controls, _of(below, stand))
         _troubles[controls.session_uid] = str(error)
+
+
+def _of(whole: tweaks.Stand, part: tweaks.Stand) -> tweaks.Stand:
+    """Of one pose what another one names."""
+    return tweaks.Stand(
+        {n: v for n, v in whole.sliders.items() if n in part.sliders},
+        {n: v for n, v in whole.places.items() if n in part.places},
+        {n: v for n, v in whole.bones.items() if n in part.bones},
+    )
 
 
 def _take_keys(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> None:
@@ -162,70 +237,112 @@ def _take_keys(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> N
     else:  # another action is played since: it is what lies below from now on
         _keep(controls)
         return
-    now, inserted, foreign = _curves(controls, action), [], False
+    now, inserted, foreign = _curves(controls, action), {}, False
     for name, curve in now.items():
         found = _inserted(curve, before.get(name), frame)
         if found is None:
             foreign = True
         elif found:
-            inserted.append(name)
-    hand = _Hand(frame)
-    held = _hands.get(controls.session_uid)
-    if inserted and held is not None and abs(held.frame - frame) < _AT:
-        hand = held  # the key brought what had none back to the keys below
-    for name in inserted:
-        _note_key(controls, hand, now[name], frame)
-    for name in inserted:
-        _restore(controls, action, now[name], before.get(name), frame)
+            inserted[name] = found
     if inserted:
+        hands = _hands_of(controls, tweak, now, inserted, frame)
+        for name, frames in inserted.items():
+            _restore(controls, action, now[name], before.get(name), frames)
         action.update_tag()
-        _take(controls, hand)
+        _take_all(controls, tweak, hands, frame)
     if foreign or before.keys() - now.keys() or (inserted and not before):
         _keep(controls)
 
 
+def _hands_of(
+    controls: ArmatureObject,
+    tweak: tweaks.Tweak,
+    curves: Curves,
+    inserted: dict[CurveName, list[float]],
+    frame: float,
+) -> list[_Hand]:
+    """What new keys ask for: one at each of their frames, the current one last."""
+    held = _hands.get(controls.session_uid)
+    by_frame: dict[float, list[bpy.types.FCurve]] = {}
+    for name, frames in inserted.items():
+        for at in frames:
+            by_frame.setdefault(frame if abs(at - frame) < _AT else at, []).append(curves[name])
+    is_held = held is not None and abs(held.frame - frame) < _AT
+    hands = [held] if held is not None and is_held and frame not in by_frame else []
+    for at in sorted(by_frame, key=lambda at: (at == frame, at)):
+        hand = _Hand(at)
+        if held is not None and is_held and at == frame:
+            hand = held  # the key brought what had none back to the keys below
+        hand.held = True
+        shown = tweaks.below_at(controls, tweak, at)  # with the new keys, also beside strips
+        for curve in by_frame[at]:
+            _note_key(hand.stand, shown, curve)
+        hands.append(hand)
+    return hands
+
+
+def _note_key(stand: tweaks.Stand, shown: tweaks.Stand, curve: bpy.types.FCurve) -> None:
+    path, label = curve.data_path, curve_colours.label_of(curve.data_path)
+    bone = path.split('"')[1]
+    if label in shown.sliders:
+        stand.sliders[label] = shown.sliders[label]
+    elif path in shown.bones:
+        stand.bones[path] = shown.bones[path]
+    elif path == board.path_of(bone) and bone in shown.places:
+        stand.places[bone] = shown.places[bone]
+
+
+def _take_all(
+    controls: ArmatureObject, tweak: tweaks.Tweak, hands: list[_Hand], frame: float
+) -> None:
+    """Take keys of several frames, the current one last: it is what the controls stand at."""
+    with tweaks.curves_so_far(controls) as old:
+        for hand in hands:
+            _take(controls, hand, old)
+    below = tweaks.below_at(controls, tweak, frame)
+    for hand in hands:
+        if hand.frame != frame:
+            tweaks.put(controls, _of(below, hand.stand))
+
+
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
-    """The curves of an action that a tweak takes the place of: of sliders and of handles."""
+    """The curves of an action that a tweak takes the place of: of sliders, handles and bones.
+
+    Of the bones all channels, also those that move nothing, which Blender keys with the others.
+    """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}
-    paths = {board.path_of(bone) for bone in handles}
+    own = (bone.name for bone in controls.data.bones if parts.PART in bone)
+    starts = tuple(
+        f'pose.bones["{bpy.utils.escape_identifier(name)}"].{channel}'
+        for name in dict.fromkeys([*handles, *own])
+        for channel in _CHANNELS
+    )
     return {
         (c.data_path, c.array_index): c
         for c in compat.curves_for(action, controls)
-        if c.data_path in paths or curve_colours.label_of(c.data_path)
+        if c.data_path.startswith(starts) or curve_colours.label_of(c.data_path)
     }
 
 
 def _inserted(
     curve: bpy.types.FCurve, before: bpy.types.FCurve | None, frame: float
-) -> bool | None:
-    """Whether a key was set at a frame since, and nothing else; None after any other edit."""
+) -> list[float] | None:
+    """The frames of keys that came since; None after any other edit."""
     frames, values = clip_actions.key_points(curve)
-    there = np.abs(frames - frame) < _AT
     if before is None:
-        return True if len(frames) == 1 and there.all() else None
+        return frames.tolist()
     old_frames, old_values = clip_actions.key_points(before)
-    if len(frames) == len(old_frames) + 1 and there.sum() == 1:
-        same = np.allclose(frames[~there], old_frames) and np.allclose(values[~there], old_values)
-        return True if same else None
-    if len(frames) != len(old_frames) or not np.allclose(frames, old_frames):
-        return None
-    differ = np.abs(values - old_values) > _NEAR
-    if not differ.any():
-        return False
-    return True if (differ == (differ & there)).all() else None
-
-
-def _note_key(controls: ArmatureObject, hand: _Hand, curve: bpy.types.FCurve, frame: float) -> None:
-    value = curve.evaluate(frame)
-    label = curve_colours.label_of(curve.data_path)
-    if label:
-        hand.sliders[label] = value
-        return
-    bone = curve.data_path.split('"')[1]
-    place = list(hand.places.get(bone, controls.pose.bones[bone].location[:]))
-    place[curve.array_index] = value
-    hand.places[bone] = tuple(place)
+    if not len(frames) or not len(old_frames):
+        return None if len(old_frames) else frames.tolist()
+    places = np.abs(frames[:, None] - old_frames).argmin(axis=1)
+    same = np.abs(frames - old_frames[places]) < _AT
+    if len(frames) - (~same).sum() != len(old_frames) or len({*places[same]}) != len(old_frames):
+        return None  # keys were moved, deleted or doubled
+    changed = same & (np.abs(values - old_values[places]) > _NEAR)
+    if same.all() and (changed & (np.abs(frames - frame) >= _AT)).any():
+        return None  # keys were moved up or down
+    return frames[~same | changed].tolist()
 
 
 def _restore(
@@ -233,7 +350,7 @@ def _restore(
     action: bpy.types.Action,
     curve: bpy.types.FCurve,
     before: bpy.types.FCurve | None,
-    frame: float,
+    frames: list[float],
 ) -> None:
     """Give a curve the keys that it had; one that was not there goes."""
     if before is None:
@@ -242,15 +359,14 @@ def _restore(
             bag.fcurves.remove(curve)
         return
     points, old = curve.keyframe_points, before.keyframe_points
-    for index, point in enumerate(points):
-        if abs(point.co.x - frame) > _AT:
-            continue
-        if len(points) > len(old):
-            points.remove(point, fast=True)
-        else:
+    there = clip_actions.key_points(before)[0]
+    new = [i for i, point in enumerate(points) if np.abs(there - point.co.x).min() >= _AT]
+    for index in reversed(new):  # one by one: to remove a key moves those behind it
+        points.remove(points[index], fast=True)
+    for point, kept in zip(points, old, strict=True):
+        if any(abs(point.co.x - f) < _AT for f in frames):
             for name in _KINDS:
-                setattr(point, name, getattr(old[index], name))
-        break
+                setattr(point, name, getattr(kept, name))
     for name in _ARRAYS:
         values = np.empty(len(old) * 2, np.float32)
         old.foreach_get(name, values)
@@ -259,26 +375,19 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """Sliders that differ from the keys below; None for none, and beside NLA strips."""
-    data, rig = controls.animation_data, parts.rig_of(controls)
-    if rig is None or (data is not None and _is_mixed(data)):
+    """What differs from the keys below; None for nothing."""
+    rig = parts.rig_of(controls)
+    if rig is None:
         return None
-    face, hand = controls.pose.bones[parts.FACE], _Hand(frame)
+    now, below = tweaks.now(controls), _below(controls, tweak, frame)
+    hand = _Hand(frame)
+    differ = tweaks.changed(_of(now, below), below)
     if board.leads_face(rig):
-        places = board.places_of(controls, runtime.there(rig))
-        for bone, place in tweaks.places_below(controls, tweak, frame).items():
-            now = places.get(bone, place)
-            if any(abs(a - b) > _NEAR for a, b in zip(now, place, strict=True)):
-                hand.places[bone] = now
-        return hand if hand.places else None
-    led = {curve_colours.label_of(c.data_path) for c in (data.drivers if data is not None else ())}
-    for label, value in tweaks.sliders_below(controls, tweak, frame).items():
-        if label in face and label not in led and abs(float(face[label]) - value) > _NEAR:
-            hand.sliders[label] = float(face[label])
-    return hand if hand.sliders else None
-
-
-def _is_mixed(data: bpy.types.AnimData) -> bool:
-    """Whether strips move the face too, and its action does not say alone what is shown."""
-    strips = data.use_nla and any(len(t.strips) and not t.mute for t in data.nla_tracks)
-    return strips or data.action_influence < 1.0 or data.action_blend_type != "REPLACE"
+        hand.stand.places = differ.places
+    else:
+        data = controls.animation_data
+        drivers = data.drivers if data is not None else ()
+        led = {curve_colours.label_of(c.data_path) for c in drivers}
+        hand.stand.sliders = {n: v for n, v in differ.sliders.items() if n not in led}
+    hand.stand.bones = differ.bones
+    return hand if hand.stand != tweaks.Stand() else None

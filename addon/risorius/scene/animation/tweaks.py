@@ -2,28 +2,39 @@
 """A tweak over a range: edits go into a layer that is added to the keys below and touches none.
 
 While a tweak is on, what would be keyed is taken as its difference from what the keys below show;
-then the slider stands on these again, and the layer adds the difference. Where the face board
-leads, the same holds for its handles.
+then the slider stands on these again, and the layer adds the difference. The same holds for the
+bones that turn head, neck and eyes, for the gaze target, and for the handles of a face board that
+leads.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 
 import bpy
+import numpy as np
 
+from ...logic.animation import clip_units
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
-from ..base import compat, parts
+from ..base import compat, parts, stage
 from ..base.blender_types import ArmatureObject
 from ..character import board, runtime, sides
 from . import clip_actions, curve_colours, layer_mixing, layer_properties, layers
 
 _ON = "risorius_tweak"  # on the control armature: the tweak that is on, as JSON
 _LEAST = 1e-5  # a difference that counts
+_TARGET = "eyes"  # the bone of the gaze target
+_REST = (0.0, 0.0, 0.0)  # of its place
+_FARTHEST = (179.0, 89.0, 179.0)  # degrees of yaw, pitch and roll that a layer can hold
+
+
+Curves = Mapping[tuple[str, int], bpy.types.FCurve]  # by data path and index
+Rows = dict[str, tuple[float, ...]]
 
 
 @dataclass
@@ -37,6 +48,7 @@ class Tweak:
         base: what the sliders without keys stand at, by their names.
         places: where handles of the face board without keys stand, by their bones.
         bare: whether the face played no action when the tweak began.
+        bones: the same of the control bones, by the data paths of `paths_of`.
     """
 
     first: float
@@ -46,11 +58,38 @@ class Tweak:
     base: dict[str, float]
     places: dict[str, list[float]] = field(default_factory=dict)
     bare: bool = False
+    bones: dict[str, list[float]] = field(default_factory=dict)
 
     def weight(self, frame: float) -> float:
         """How much of the layer a frame shows, 0 to 1."""
         ends = min(frame - self.first, self.last - frame)
         return min(max(ends / self.fade, 0.0), 1.0) if self.fade else float(ends > 0.0)
+
+
+@dataclass
+class Stand:
+    """What stands in a pose of the controls.
+
+    Attributes:
+        sliders: values by their names.
+        places: of handles of the face board, by their bones.
+        bones: numbers by the data paths of `paths_of`.
+    """
+
+    sliders: dict[str, float] = field(default_factory=dict)
+    places: Rows = field(default_factory=dict)
+    bones: Rows = field(default_factory=dict)
+
+
+def paths_of(controls: ArmatureObject) -> dict[str, str]:
+    """The properties of control bones that a tweak takes: data path -> bone."""
+    bones, found = controls.pose.bones, {}
+    for name in clip_units.TURNS:
+        if name in bones:
+            found[f'pose.bones["{name}"].{clip_actions.rotation_path(bones[name])}'] = name
+    if _TARGET in bones:
+        found[f'pose.bones["{_TARGET}"].location'] = _TARGET
+    return found
 
 
 def of(controls: ArmatureObject) -> Tweak | None:
@@ -67,11 +106,13 @@ def of(controls: ArmatureObject) -> Tweak | None:
 
 def _is_sound(tweak: Tweak) -> bool:
     """Whether a tweak that a file says to be on holds what it must."""
-    base, places = tweak.base, tweak.places
-    if not isinstance(base, dict) or not isinstance(places, dict):
+    base, places, bones = tweak.base, tweak.places, tweak.bones
+    if not all(isinstance(part, dict) for part in (base, places, bones)):
         return False
-    rows = [*places.values()]
-    if not isinstance(tweak.layer, str) or any(type(r) is not list or len(r) != 3 for r in rows):
+    rows = [*places.values(), *bones.values()]
+    if not isinstance(tweak.layer, str) or any(type(r) is not list for r in rows):
+        return False
+    if any(len(r) != 3 for r in places.values()):
         return False
     numbers = [tweak.first, tweak.last, tweak.fade, *base.values(), *(n for r in rows for n in r)]
     return all(isinstance(n, (int, float)) and math.isfinite(n) for n in numbers)
@@ -96,6 +137,8 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
     if rig is not None:
         places = board.places_of(controls, runtime.there(rig))
         tweak.places = {bone: list(place) for bone, place in places.items()}
+    for path in paths_of(controls):
+        tweak.bones[path] = [*controls.path_resolve(path)]
     data = controls.animation_data
     tweak.bare = data is None or data.action is None
     controls[_ON] = json.dumps(asdict(tweak))
@@ -107,19 +150,29 @@ def end(controls: ArmatureObject) -> None:
         del controls[_ON]
 
 
-def take(controls: ArmatureObject, labels: Iterable[str], frame: float) -> int:
-    """Take what sliders show as the tweak of a frame; then they stand as the keys below say.
+def take(
+    controls: ArmatureObject,
+    labels: Iterable[str],
+    frame: float,
+    bones: Iterable[str] = (),
+    held: bool = False,
+    old: Curves | None = None,
+) -> int:
+    """Take what sliders and bones show as the tweak of a frame; then they stand as keys below say.
 
     Args:
         controls: its control armature, with a tweak that is on.
         labels: the sliders.
         frame: of the scene.
+        bones: data paths as of `paths_of`; others are passed over.
+        held: also what shows no difference gets a key where the tweak moves it already.
+        old: what the tweak adds so far, from `curves_so_far`; None for what it adds now.
 
     Returns:
-        How many sliders are tweaked by it.
+        How many sliders and bones are tweaked by it.
 
     Raises:
-        FaceError: the frame lies outside the tweak.
+        FaceError: the frame lies outside the tweak, or too near to its end for a turn so far.
     """
     tweak = of(controls)
     assert tweak is not None
@@ -132,32 +185,247 @@ def take(controls: ArmatureObject, labels: Iterable[str], frame: float) -> int:
                 last=tweak.last,
             )
         )
-    face, below = controls.pose.bones[parts.FACE], sliders_below(controls, tweak, frame)
-    changes = {n: float(face[n]) - below[n] for n in labels if n in below}
-    changes |= _given(controls, tweak, frame)
+    face, below = controls.pose.bones[parts.FACE], below_at(controls, tweak, frame)
+    changes = {n: float(face[n]) - below.sliders[n] for n in labels if n in below.sliders}
+    known = {path: name for path, name in paths_of(controls).items() if path in below.bones}
+    asked = {path: known[path] for path in bones if path in known}
+    old = _tweaked(controls, tweak) if old is None else old
+    rows = _bone_rows(controls, asked, below, old, frame, weight, held)
+    changes |= _given(controls, below)
     for follower, leader in sides.followers(controls).items():
         if leader in changes:  # a driver lets it follow the slider, and no layer
             changes[follower] = changes[leader]
-    changes = {n: change for n, change in changes.items() if abs(change) > _LEAST}
-    if not changes:
-        return 0
+    for label, change in changes.items():
+        path = parts.property_path(label)
+        if abs(change) > _LEAST or (held and (path, 0) in old):
+            there = old[path, 0].evaluate(frame) if (path, 0) in old else 0.0
+            rows[path] = [there + change / weight]
+    if rows:
+        _insert(controls, tweak, rows, frame)
+    for label in changes.keys() & below.sliders.keys():
+        face[label] = below.sliders[label]
+    put_bones(controls, {path: below.bones[path] for path in asked})
+    controls.update_tag()
+    return len(rows)
+
+
+def put_bones(controls: ArmatureObject, values: Mapping[str, Sequence[float]]) -> None:
+    """Bring control bones to where they stood.
+
+    Args:
+        controls: the control armature.
+        values: numbers by data path.
+    """
+    for path, numbers in values.items():
+        owner, _, name = path.rpartition(".")
+        setattr(controls.path_resolve(owner), name, numbers)
+
+
+@contextmanager
+def curves_so_far(controls: ArmatureObject) -> Iterator[Curves]:
+    """The curves of a tweak's layer as they are now, for keys of several frames that come at once.
+
+    Args:
+        controls: the control armature, with a tweak that is on.
+    """
+    tweak = of(controls)
+    layer = _layer_of(controls, tweak) if tweak is not None else None
+    if layer is None or layer.action is None:
+        yield {}
+        return
+    copy = layer.action.copy()
+    try:
+        yield _curves_in(copy, controls)
+    finally:
+        bpy.data.actions.remove(copy)
+
+
+def _tweaked(controls: ArmatureObject, tweak: Tweak) -> Curves:
+    """The curves of a tweak's layer, by data path and index."""
+    layer = _layer_of(controls, tweak)
+    return {} if layer is None or layer.action is None else _curves_in(layer.action, controls)
+
+
+def _curves_in(action: bpy.types.Action, controls: ArmatureObject) -> Curves:
+    curves = compat.curves_for(action, controls)
+    return {(c.data_path, c.array_index): c for c in curves if len(c.keyframe_points)}
+
+
+def _layer_of(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_PG_layer | None:
+    return next((y for y in layers.of(controls) if y.name == tweak.layer), None)
+
+
+def _bone_rows(
+    controls: ArmatureObject,
+    asked: Mapping[str, str],
+    below: Stand,
+    old: Curves,
+    frame: float,
+    weight: float,
+    held: bool,
+) -> dict[str, list[float]]:
+    """What the layer needs at a frame so that bones stand as they stand now, by data path."""
+    rows = {}
+    for path, name in asked.items():
+        bone = controls.pose.bones[name]
+        pair = np.array([below.bones[path], controls.path_resolve(path)[:]], np.float64)
+        if name == _TARGET:
+            mode, way, angles = "", clip_actions.Turning("", path, _rows_of(old, path), _REST), pair
+        else:
+            mode = bone.rotation_mode
+            angles = clip_actions.angles_in_armature(bone, mode, pair)
+            way = clip_actions.turning(bone, old)
+            way = way or clip_actions.turning_in(bone, mode, old)
+        change = angles[1] - angles[0]
+        if mode:
+            change = (change + math.pi) % math.tau - math.pi
+        if np.abs(change).max() <= _LEAST and not (held and any(way.curves)):
+            continue
+        there = way.values(np.array([frame]))
+        if not mode:
+            rows[path] = (there[0] + change / weight).tolist()
+            continue
+        row = clip_actions.angles_in_armature(bone, way.mode, there)[0] + change / weight
+        if (np.abs(np.degrees(row)) > _FARTHEST).any():
+            share = 100.0 * weight
+            raise FaceError(
+                told(
+                    "The tweak shows only {share:.0f} % here, too little for a turn this far: go "
+                    "nearer to its middle.",
+                    share=share,
+                )
+            )
+        rows[way.path] = clip_actions.rotation_of(bone, way.mode, row[None])[0].tolist()
+    return rows
+
+
+def _rows_of(curves: Curves, path: str) -> list[bpy.types.FCurve | None]:
+    """The three curves of a place."""
+    return [curves.get((path, axis)) for axis in range(3)]
+
+
+def _insert(
+    controls: ArmatureObject, tweak: Tweak, rows: Mapping[str, Sequence[float]], frame: float
+) -> None:
+    """Give the layer of a tweak keys at a frame: numbers by data path."""
     layer = _layer(controls, tweak)
     action = layer.action
     bag = compat.bag_for(action, controls)
     assert bag is not None
-    for label, change in changes.items():
-        path = parts.property_path(label)
-        curve = bag.fcurves.find(path) or bag.fcurves.new(path)
-        there = curve.evaluate(frame) if len(curve.keyframe_points) else 0.0
-        curve.keyframe_points.insert(frame, there + change / weight)
-        _hold_ends(curve, tweak)
-        if label in below:
-            face[label] = below[label]
+    for path, numbers in rows.items():
+        for index, value in enumerate(numbers):
+            curve = bag.fcurves.find(path, index=index) or bag.fcurves.new(path, index=index)
+            curve.keyframe_points.insert(frame, value)
+            _hold_ends(curve, tweak)
     curve_colours.colour_action(controls, action)
     layer.start = action.frame_range[0]
     layer_mixing.note_edits([action])  # nothing plays it that Blender would tell of
-    controls.update_tag()
-    return len(changes)
+
+
+def is_mixed(controls: ArmatureObject) -> bool:
+    """Whether strips move the face too, and its action does not say alone what is shown."""
+    data = controls.animation_data
+    if data is None:
+        return False
+    strips = data.use_nla and any(len(t.strips) and not t.mute for t in data.nla_tracks)
+    return strips or data.action_influence < 1.0 or data.action_blend_type != "REPLACE"
+
+
+def now(controls: ArmatureObject) -> Stand:
+    """What all that a tweak takes stands at. Args: controls  the original or evaluated armature."""
+    face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls.original)
+    found = Stand({n: float(v) for n, v in face.items() if isinstance(v, float)})
+    if rig is not None:
+        found.places = board.places_of(controls, runtime.there(rig))
+    found.bones = {path: (*controls.path_resolve(path),) for path in paths_of(controls)}
+    return found
+
+
+def changed(stand: Stand, other: Stand) -> Stand:
+    """What of a pose differs from another one.
+
+    Args:
+        stand: the pose.
+        other: the one it is compared with; what this does not name is left out.
+    """
+
+    def differing(rows: Rows, others: Rows) -> Rows:
+        return {
+            key: row
+            for key, row in rows.items()
+            if key in others
+            and any(abs(a - b) > _LEAST for a, b in zip(row, others[key], strict=True))
+        }
+
+    return Stand(
+        {n: v for n, v in stand.sliders.items() if abs(v - other.sliders.get(n, v)) > _LEAST},
+        differing(stand.places, other.places),
+        differing(stand.bones, other.bones),
+    )
+
+
+def put(controls: ArmatureObject, stand: Stand) -> None:
+    """Bring the controls to a pose; what it does not name stays.
+
+    Args:
+        controls: the control armature.
+        stand: from `now` or `below_at`, or a part of one.
+    """
+    face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls)
+    for label, value in stand.sliders.items():
+        face[label] = value
+    if rig is not None and stand.places:
+        board.put_places(controls, runtime.there(rig), stand.places)
+    put_bones(controls, stand.bones)
+
+
+def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
+    """What the controls stand at without the tweak.
+
+    Beside NLA strips Blender itself is asked, in a graph of its own.
+
+    Args:
+        controls: the control armature.
+        tweak: which is on.
+        frame: of the scene.
+    """
+    base = Stand(
+        dict(tweak.base),
+        {bone: (*place,) for bone, place in tweak.places.items()},
+        {path: (*numbers,) for path, numbers in tweak.bones.items() if path in paths_of(controls)},
+    )
+    if is_mixed(controls):
+        return _shown(controls, base, frame)
+    by_place = {board.path_of(bone): bone for bone in base.places}
+    for curve in _curves(controls):
+        path, index, value = curve.data_path, curve.array_index, curve.evaluate(frame)
+        label = curve_colours.label_of(path)
+        if label in base.sliders:
+            base.sliders[label] = value
+        for rows, key in ((base.places, by_place.get(path, "")), (base.bones, path)):
+            if key in rows and index < len(rows[key]):
+                rows[key] = (*rows[key][:index], value, *rows[key][index + 1 :])
+    return base
+
+
+def _shown(controls: ArmatureObject, base: Stand, frame: float) -> Stand:
+    """What Blender shows at a frame; what nothing moves stands as in a given pose."""
+    data = controls.animation_data
+    assert data is not None
+    actions = compat.played_actions(controls) if data.use_nla else filter(None, [data.action])
+    paths = {c.data_path for action in actions for c in compat.curves_of(action)}
+    held = now(controls)
+    with stage.shown_at(controls, frame) as seen:
+        found = now(seen)
+    put(controls, changed(held, now(controls)))
+    for label in base.sliders.keys() & found.sliders.keys():
+        if parts.property_path(label) in paths:
+            base.sliders[label] = found.sliders[label]
+    for bone in base.places.keys() & found.places.keys():
+        if board.path_of(bone) in paths:
+            base.places[bone] = found.places[bone]
+    base.bones |= {path: v for path, v in found.bones.items() if path in paths & base.bones.keys()}
+    return base
 
 
 def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
@@ -168,53 +436,19 @@ def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
     return clip_actions.playing_curves(data.action, controls)
 
 
-def sliders_below(controls: ArmatureObject, tweak: Tweak, frame: float) -> dict[str, float]:
-    """Values of the sliders without the tweak, by name.
-
-    Args:
-        controls: the control armature.
-        tweak: which is on.
-        frame: of the scene.
-    """
-    found = dict(tweak.base)
-    for curve in _curves(controls):
-        label = curve_colours.label_of(curve.data_path)
-        if label in found:
-            found[label] = curve.evaluate(frame)
-    return found
-
-
-def places_below(
-    controls: ArmatureObject, tweak: Tweak, frame: float
-) -> dict[str, tuple[float, ...]]:
-    """Where the handles of the face board stand without the tweak, by their bones.
-
-    Args:
-        controls: the control armature.
-        tweak: which is on.
-        frame: of the scene.
-    """
-    found = {bone: list(place) for bone, place in tweak.places.items()}
-    bones = {board.path_of(bone): bone for bone in found}
-    for curve in _curves(controls):
-        if curve.data_path in bones:
-            found[bones[curve.data_path]][curve.array_index] = curve.evaluate(frame)
-    return {bone: tuple(place) for bone, place in found.items()}
-
-
-def _given(controls: ArmatureObject, tweak: Tweak, frame: float) -> dict[str, float]:
+def _given(controls: ArmatureObject, below: Stand) -> dict[str, float]:
     """By how much a board that leads gives more than without the tweak; its handles go back."""
     rig = parts.rig_of(controls)
     if rig is None or not board.leads_face(rig):
         return {}
-    now = board.given(rig)
-    board.put_places(controls, runtime.there(rig), places_below(controls, tweak, frame))
-    return {label: now[label] - value for label, value in board.given(rig).items()}
+    shown = board.given(rig)
+    board.put_places(controls, runtime.there(rig), below.places)
+    return {label: shown[label] - value for label, value in board.given(rig).items()}
 
 
 def _layer(controls: ArmatureObject, tweak: Tweak) -> layer_properties.RISORIUS_PG_layer:
     """The layer of a tweak, made when first something is tweaked."""
-    found = next((y for y in layers.of(controls) if y.name == tweak.layer), None)
+    found = _layer_of(controls, tweak)
     if found is not None and found.action is not None:
         return found
     name = f"{controls.name.removesuffix('_controls')} tweak {tweak.first:g}-{tweak.last:g}"

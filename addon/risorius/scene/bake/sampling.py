@@ -8,17 +8,17 @@ gives, the rest of the user's scene costs nothing, and its frame never changes.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, cast
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Quaternion
+from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ..animation import layers
+from ..animation import layer_mixing, layers
 from ..base import compat, drivers, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
@@ -231,7 +231,7 @@ class _Reader:
         self,
         depsgraph: Depsgraph,
         raw: NDArray[np.float32],
-        own: Mapping[str, Quaternion | None],
+        own: layer_mixing.Bones,
     ) -> Iterator[None]:
         """While this lasts constraints on the joints of neck and head see the turns of this frame.
 
@@ -262,9 +262,9 @@ class _Reader:
             self.rig.update_tag(refresh={"OBJECT"})
 
     def _read_control_bones(
-        self, number: int, seen: ArmatureObject, own: Mapping[str, Quaternion | None]
+        self, number: int, seen: ArmatureObject, own: layer_mixing.Bones
     ) -> None:
-        """Args: own  how neck and head are turned with the layers, in the armature's axes."""
+        """Args: own  how they are turned and moved with the layers."""
         basis = self.samples.basis
         for name, matrices in basis.items():
             bone = seen.pose.bones[name]
@@ -275,13 +275,17 @@ class _Reader:
                 if bone.constraints
                 else bone.matrix_basis
             )
-        for name, turn in own.items() if self.layered else ():
-            if turn is not None and name in basis:
-                matrix = Matrix(basis[name][number].tolist())
+        for name in basis if self.layered else ():
+            matrix = Matrix(basis[name][number].tolist())
+            place, turn, scale = matrix.decompose()
+            if name in own.turns:
                 rest = self.controls.data.bones[name].matrix_local.to_quaternion()
-                basis[name][number] = Matrix.LocRotScale(
-                    matrix.to_translation(), rest.inverted() @ turn @ rest, matrix.to_scale()
-                )
+                turn = rest.inverted() @ own.turns[name] @ rest
+            elif name == "eyes" and own.target is not None:
+                place = own.target
+            else:
+                continue
+            basis[name][number] = Matrix.LocRotScale(place, turn, scale)
 
 
 def _value(owner: bpy.types.ID, path: str) -> list[float] | None:

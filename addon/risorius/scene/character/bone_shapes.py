@@ -85,6 +85,8 @@ _COLOURS = {
     "face": (0.25, 0.85, 0.35),
 }
 
+PLACED = frozenset(_OUTLINES)  # the control bones that `place` knows
+
 
 def make(made: list[bpy.types.ID], character: str, bone: str) -> bpy.types.Object:
     """The outline of a bone as a wire mesh, in no collection: only the bone shows it.

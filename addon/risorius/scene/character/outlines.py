@@ -8,8 +8,10 @@ from typing import Any
 
 import bpy
 
+from ...logic.character import plans
 from ..base import parts
 from ..base.blender_types import ArmatureObject
+from . import armatures, bone_shapes, lods, runtime
 
 
 def are_hidden(controls: ArmatureObject) -> bool:
@@ -41,6 +43,29 @@ def show(controls: ArmatureObject) -> None:
         if not any(bone.custom_shape_scale_xyz[:]):  # else the user has given it a size meanwhile
             bone.custom_shape_scale_xyz = sizes.get(part, (1.0, 1.0, 1.0))
     controls.pop(parts.OUTLINES, None)
+
+
+def stand_beside(rig: ArmatureObject) -> int:
+    """Put the outlines where a face that is made today has them.
+
+    Those of files from before stand over the eyes. Sizes that were changed by hand go with it.
+
+    Args:
+        rig: the character's deforming armature.
+
+    Returns:
+        How many outlines were moved or sized.
+    """
+    controls, live = parts.controls_there(rig), runtime.there(rig)
+    levels, unit = tuple(lods.built(rig)) or (0,), runtime.unit_of(rig)
+    plan = plans.plan_character(live.dna, rig.name, levels, unit, live.rests)
+    show(controls)
+    room, moved = armatures.outline_room(plan), 0
+    for part, bone in _bones(controls):
+        if part in bone_shapes.PLACED and not bone_shapes.is_placed(bone, part, room):
+            bone_shapes.place(bone, part, room)
+            moved += 1
+    return moved
 
 
 def _bones(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.PoseBone]]:

@@ -181,7 +181,7 @@ def _gains(
         return gain
 
     def mixed(values: NDArray[np.float32]) -> NDArray[np.float32]:
-        return layer_mixing.mix(seen, live, values, {}, depsgraph, maximum)[0]
+        return layer_mixing.mix(seen, live, values, layer_mixing.Bones(), depsgraph, maximum)[0]
 
     base = start.astype(np.float32)
     before = mixed(base)

@@ -283,7 +283,7 @@ def clip(
     rows = samples.raw.T
     for bone in ("neck", "head"):
         if any(bone in turns for turns in samples.turns):
-            names += clip_units.TURNED[bone]
+            names += clip_units.TURNS[bone]
             turned = np.array([turns.get(bone, Quaternion()) for turns in samples.turns])
             rows = np.concatenate([rows, clip_units.angles_of(turned).T])
     if maps:

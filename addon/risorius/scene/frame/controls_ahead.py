@@ -5,92 +5,33 @@ Blender evaluates a frame in one go, simulations too, and calls its handlers aft
 write comes too late for cloth and hair. So the control armatures alone are evaluated first, in a
 graph of their own, and the face has its pose when the frame begins.
 
-The scene of that graph is in no file: it lies in data of its own, where no list, save, undo step,
-append or handler finds it. It has the armatures as cameras of its markers: those are evaluated and
-get no user by it. What else is evaluated there is what moves them, and Blender finds that itself.
+The scene of that graph is in no file, see `stage`.
 """
 
 from __future__ import annotations
 
-import ctypes
-import sys
 import threading
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import cast
+from collections.abc import Iterable, Sequence
+from contextlib import nullcontext
 
 import bpy
 
 from ...logic.base.sentences import told
-from ..base import parts, session
+from ..base import parts, session, stage
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement
 from . import caches, lateness
 
-# Blender counts one reference too few to temporary data, and would free it twice. The newest that
-# was seen to do so; in a newer one the references are counted each time.
-MISCOUNTED_UNTIL = (5, 2)
-_FAR = 1_000_000  # frame of the first marker: no animation gets there
-_HANDLERS = (
-    "frame_change_pre",
-    "frame_change_post",
-    "depsgraph_update_pre",
-    "depsgraph_update_post",
-)
-_TIME = ("fps", "fps_base", "frame_map_old", "frame_map_new")
-
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 
 # Scene -> its stage.
-_stages: dict[int, _Stage] = session.table("controls_ahead.stages", ("unregister",))
+_stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
 # Whether the file was edited since the last frame, and whether anything in it is simulated.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes, since the last load or undo.
 _evaluated_scenes: set[int] = session.keep("controls_ahead.evaluated_scenes", set, ("free",))
 _LOCK = threading.Lock()  # a render works beside the interface
-
-
-class _Stage:
-    """A scene in data of its own.
-
-    Args:
-        roots: what is evaluated.
-    """
-
-    def __init__(self, roots: Sequence[bpy.types.Object]) -> None:
-        data = bpy.data.temp_data()  # which the stubs take for what it gives
-        self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
-        self._file = self._data.__enter__()
-        # Ours, that of what gave it, and the one that is asked here are three.
-        if bpy.app.version[:2] <= MISCOUNTED_UNTIL or sys.getrefcount(self._file) < 3:
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
-        self._scene = self._file.scenes.new("Risorius")
-        for number, item in enumerate(roots):
-            marker = self._scene.timeline_markers.new(str(number), frame=_FAR + number)
-            marker.camera = item
-        self.roots = _identity(roots)
-
-    def evaluate(self, user: bpy.types.Scene) -> Depsgraph:
-        """The graph at the time of a scene."""
-        own, layer = self._scene, self._scene.view_layers[0]
-        for name in _TIME:
-            value = getattr(user.render, name)
-            if getattr(own.render, name) != value:
-                setattr(own.render, name, value)
-        own.frame_current = user.frame_current
-        if own.frame_subframe != user.frame_subframe:
-            own.frame_subframe = user.frame_subframe
-        with _unheard():
-            if own.frame_current == user.frame_current:
-                layer.update()
-            else:  # below 0 the preferences forbid it, but not to scripts; redraws every window
-                own.frame_set(user.frame_current, subframe=user.frame_subframe)
-        return cast("Depsgraph", layer.depsgraph)
-
-    def close(self) -> None:
-        """Free the scene and its graph."""
-        self._data.__exit__(None, None, None)
 
 
 def is_edited() -> bool:
@@ -211,26 +152,25 @@ def _close() -> None:
 
 def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
     roots = _roots(faces)
-    stage = _stages.get(user.session_uid)
-    if stage is not None and stage.roots != _identity(roots):
+    made = _stages.get(user.session_uid)
+    if made is not None and made.roots != stage.identity(roots):
         _close()
-        stage = None
-    if stage is None:
-        stage = _stages[user.session_uid] = _Stage(roots)
+        made = None
+    if made is None:
+        made = _stages[user.session_uid] = stage.Stage(roots)
         _edited.now = True
-    # Without an interface scripts edit and step without an update between, and nobody looks on.
-    with _alone(faces) if _edited.now or bpy.app.background else nullcontext():
-        return stage.evaluate(user)
+    with stage.alone(c for _rig, c in faces) if is_edited() else nullcontext():
+        return made.evaluate(user)
 
 
 def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
     """Whether what moves a face depends on one of several faces, itself among them."""
-    stage = _Stage(_roots([face]))
+    made = stage.Stage(_roots([face]))
     try:
-        with _alone(others):
-            return _faces_in(stage.evaluate(user), others, whole=True)
+        with stage.alone(c for _rig, c in others):
+            return _faces_in(made.evaluate(user), others, whole=True)
     finally:
-        stage.close()
+        made.close()
 
 
 def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
@@ -244,11 +184,6 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
     return list(found)
 
 
-def _identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
-    """What tells that they are still those of before, without holding them."""
-    return tuple((item.session_uid, item.as_pointer()) for item in items)
-
-
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
     """Whether a graph has a face. Args: whole  look for its meshes, too."""
     return any(
@@ -256,35 +191,3 @@ def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
         for rig, _controls in faces
         for item in (rig, *(parts.meshes_of(rig) if whole else ()))
     )
-
-
-@contextmanager
-def _alone(faces: Iterable[Face]) -> Iterator[None]:
-    """While a graph is built the controls do not point to their faces.
-
-    A graph has all that its objects' properties point to: the meshes and their keys would be
-    copied, and copied again at each frame.
-    """
-    held = [(controls, controls.get(parts.RIG)) for _rig, controls in faces]
-    held = [(controls, item) for controls, item in held if isinstance(item, bpy.types.Object)]
-    try:
-        for controls, _item in held:
-            controls[parts.RIG] = controls
-        yield
-    finally:
-        for controls, item in held:
-            controls[parts.RIG] = item  # it keeps its marks
-
-
-@contextmanager
-def _unheard() -> Iterator[None]:
-    """While this lasts no handler is told of a frame or an update: it is none of the user's."""
-    lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
-    kept = [handlers[:] for handlers in lists]
-    for handlers in lists:
-        handlers.clear()
-    try:
-        yield
-    finally:
-        for handlers, before in zip(lists, kept, strict=True):
-            handlers[:0] = before

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
-from mathutils import Matrix, Quaternion, Vector
+from mathutils import Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...logic.base.space import yaw_pitch
@@ -25,7 +25,6 @@ Float = NDArray[np.float64]
 CONSTRAINT = "Risorius Gaze"  # by it the target hangs on something else than the head
 STEPS = 4  # measured on the sample: the second leaves less than a thousandth of a degree
 _ENOUGH = 2e-5  # radians: a thousandth of a degree
-_STRAIGHT = Matrix.Identity(4)
 _AHEAD = np.array([0.0, -1.0, 0.0])
 _BLEND = 0.25  # of its distance: how far a target is moved until the eyes meet on it
 _LIDS = 0.5  # how far the lids go at full gaze and full amount
@@ -49,7 +48,10 @@ class Target:
 
 
 def target_of(
-    seen: ArmatureObject, live: runtime.Runtime, turns: Mapping[str, Quaternion]
+    seen: ArmatureObject,
+    live: runtime.Runtime,
+    turns: Mapping[str, Quaternion],
+    local: Vector | None,
 ) -> Target | None:
     """What the eyes of a character look at, or None where their target rests.
 
@@ -57,6 +59,7 @@ def target_of(
         seen: the evaluated control armature.
         live: the character's Runtime.
         turns: of "neck" and "head" in the armature's axes, with the body's.
+        local: how far the target was moved, with layers, in its own axes; None where it rests.
     """
     bone = seen.pose.bones.get("eyes")
     if bone is None:
@@ -65,21 +68,30 @@ def target_of(
     hold = bone.constraints.get(CONSTRAINT)
     if hold is not None and not hold.mute:  # it does not turn with the head
         there = np.array(bone.matrix.translation[:], np.float64)
+        if local is not None:  # what layers add to where the constraint puts it
+            more = bone.bone.matrix_local.to_3x3() @ (local - moved(seen, bone))
+            there = there + np.array(more[:])
         point = Vector(_unturned(live, there, turns).tolist())
         return Target(rest, point - rest, seen.risorius_converge)
-    if not bone.constraints and bone.matrix_basis == _STRAIGHT:
+    if local is None:
         return None
-    moved: Vector = bone.bone.matrix_local.to_3x3() @ _local(seen, bone)
-    if not moved.length_squared > 1e-18:
+    way: Vector = bone.bone.matrix_local.to_3x3() @ local
+    if not way.length_squared > 1e-18:
         return None
     far = (rest - _middle(seen)).length
-    reach = min(moved.length / max(_BLEND * far, 1e-9), 1.0)
+    reach = min(way.length / max(_BLEND * far, 1e-9), 1.0)
     # At rest the eyes look straight ahead: they come together as the target leaves its place.
     meet = seen.risorius_converge * float(np.sin(reach * np.pi / 2.0)) ** 2
-    return Target(rest, moved, meet)
+    return Target(rest, way, meet)
 
 
-def _local(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
+def moved(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Vector:
+    """How far a bone was moved, with its constraints, in its own axes.
+
+    Args:
+        seen: the evaluated armature.
+        bone: one of its pose bones.
+    """
     return seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     ).translation

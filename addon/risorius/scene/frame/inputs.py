@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
@@ -50,19 +48,24 @@ def read_mixed(
     live: runtime.Runtime,
     depsgraph: Depsgraph,
     maximum: float = 1.0,
-) -> tuple[NDArray[np.float32], Mapping[str, Quaternion | None]]:
-    """Read the sliders and the bones of head and neck with the layers above them.
+) -> tuple[NDArray[np.float32], layer_mixing.Bones]:
+    """Read the sliders and the control bones with the layers above them.
 
     Args:
         seen, live, depsgraph, maximum: as of `read_inputs`.
 
     Returns:
-        float32[R], before the eye bones add to the look controls; and "neck", "head" ->
-        Quaternion in the armature's axes or None, without the body's.
+        float32[R], before the eye bones add to the look controls; and what the bones ask for,
+        without the body's turns.
     """
     bones = seen.pose.bones
     raw = read_leading(seen, live)
-    own = {name: _turn(seen, bones.get(name)) for name in ("neck", "head")}
+    turns = {name: _turn(seen, bones.get(name)) for name in layer_mixing.TURNED}
+    target = bones.get("eyes")
+    own = layer_mixing.Bones(
+        {name: turn for name, turn in turns.items() if turn is not None},
+        None if target is None or _rests(target) else gaze.moved(seen, target),
+    )
     return layer_mixing.mix(seen, live, raw, own, depsgraph, maximum)
 
 
@@ -79,7 +82,7 @@ def seen_sliders(context: Context, rig: ArmatureObject) -> dict[str, float]:
     controls.update_tag()  # a script may have set sliders that Blender has not heard of
     depsgraph = context.evaluated_depsgraph_get()
     seen = controls.evaluated_get(depsgraph)
-    raw, _turns = read_mixed(seen, live, depsgraph, parts.maximum_of(controls))
+    raw, _bones = read_mixed(seen, live, depsgraph, parts.maximum_of(controls))
     face = controls.pose.bones[parts.FACE]
     pairs = zip(live.labels, raw.tolist(), strict=True)
     return {label: value for label, value in pairs if label in face}
@@ -91,7 +94,7 @@ def complete(
     depsgraph: Depsgraph,
     maximum: float,
     raw: NDArray[np.float32],
-    own: Mapping[str, Quaternion | None],
+    own: layer_mixing.Bones,
 ) -> tuple[NDArray[np.float32], Turns]:
     """Add what the body and the eye bones ask for.
 
@@ -102,7 +105,7 @@ def complete(
         maximum: of the sliders.
         raw: float32[R], the sliders with their layers; the look controls, and the controls that
             hold rotations of joints, are changed in place.
-        own: the turns of the character's own head and neck bones by name, None where they rest.
+        own: what the character's own control bones ask for, with their layers.
 
     Returns:
         raw, and the turns with the body's, as `read_inputs` gives them.
@@ -111,10 +114,11 @@ def complete(
     share = seen.risorius_body_turn
     if share < 1.0:  # a turn that is left as it is stays the same to the bit
         turns = {name: Quaternion().slerp(turn, share) for name, turn in turns.items()}
-    for name, turn in own.items():
+    for name in ("neck", "head"):
+        turn = own.turns.get(name)
         if turn is not None:
             turns[name] = turns[name] @ turn if name in turns else turn
-    _add_look(seen, live, raw, maximum, turns)
+    _add_look(seen, live, raw, maximum, turns, own)
     joint_turns.fill(seen, live, depsgraph, raw, turns)
     return raw, turns
 
@@ -175,17 +179,18 @@ def _add_look(
     raw: NDArray[np.float32],
     maximum: float,
     turns: Turns,
+    own: layer_mixing.Bones,
 ) -> None:
     """Add what the eye bones and their target ask for to the look controls; the lids follow."""
     bones = seen.pose.bones
     eyes = {side: bones[f"eye_{side}"] for side in live.look if f"eye_{side}" in bones}
-    target = gaze.target_of(seen, live, turns)
+    target = gaze.target_of(seen, live, turns, own.target)
     asked = {}
     if target is not None:
         centres = {side: bone.bone.head_local for side, bone in eyes.items()}
         asked = gaze.asked(live, raw, target, centres, maximum)
-    for side, bone in eyes.items():
-        turn = _turn(seen, bone)
+    for side in eyes:
+        turn = own.turns.get(f"eye_{side}")
         if turn is None and side not in asked:
             continue
         yaw, pitch = yaw_pitch((turn or Quaternion()) @ _AHEAD)

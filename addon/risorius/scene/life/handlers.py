@@ -13,7 +13,7 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layer_mixing, layers, tweak_guard
-from ..base import console, parts, session, sharing, written
+from ..base import compat, console, parts, session, sharing, written
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import board, lods, outlines, rig_placement, runtime, shown_keys
 from ..frame import (
@@ -213,8 +213,9 @@ def _note_keys(
             action in actions or (action is None and controls in armatures)
         ):
             shown_keys.note_edit(controls)
-        if controls is not None and (action in actions or controls in armatures):
-            tweak_guard.note_edit(controls, frame, action in actions)
+        if controls is not None and (actions or controls in armatures):
+            played = compat.played_actions(controls)
+            tweak_guard.note_edit(controls, frame, any(item in actions for item in played))
 
 
 def _concerned(

@@ -291,7 +291,7 @@ def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -
         called: gives the words for the name of a control or corrective.
     """
     if heat.kind == "POSE":
-        return told("Moved from neutral")
+        return told("Moved from Neutral")
     if heat.kind == "CONTROL":
         return told("Reach of {name}", name=called(heat.what.rpartition(".")[2]))
     live, controls = runtime.of(rig), parts.controls_of(rig)

@@ -17,7 +17,6 @@ from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 from ..frame import inputs
 
-_ANGLES = len(clip_units.ANGLES)  # which the mixer has after the controls
 Controls = NDArray[np.float32]
 
 
@@ -47,7 +46,8 @@ def raw_pair(
     at = stack.places.index(place)
     layer = stack.layers[at]
     # One that was solo and is muted would let others through: one that moves nothing does not.
-    stack.layers[at] = replace(layer, mask=np.zeros(len(live.labels) + _ANGLES, np.float32))
+    nothing = np.zeros(len(live.labels) + len(clip_units.BONES), np.float32)
+    stack.layers[at] = replace(layer, mask=nothing)
     stack.weights = ()  # so that the mixer takes its layers anew
     try:
         without_it, _ = inputs.read_inputs(seen, live, depsgraph, maximum)

@@ -69,7 +69,7 @@ def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) ->
         trouble = not here or bool(tweak_guard.trouble(controls))
         yield Mode(text, "MOD_TIME", "risorius.tweak", {"enable": False}, trouble)
     if board.leads_face(rig):
-        yield Mode(words.say("The board leads"), "BONE_DATA", "risorius.lead", {"by": "SLIDERS"})
+        yield Mode(words.say("The Board Leads"), "BONE_DATA", "risorius.lead", {"by": "SLIDERS"})
 
 
 def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:

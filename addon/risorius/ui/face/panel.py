@@ -83,7 +83,7 @@ def _draw_hint(layout: UILayout, context: Context) -> None:
         return
     box = layout.box()
     row = box.row()
-    words.show(row, words.say("First steps"), "LIGHT")
+    words.show(row, words.say("First Steps"), "LIGHT")
     row.operator("risorius.hide_hints", text="", icon="X")
     words.write(box, "Take Drag the Face and pull at the skin, or open a region below.")
     words.write(box, "Key All holds the pose at this frame; Layers and Animation play over it.")

@@ -71,6 +71,22 @@ class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
         return {"FINISHED"}
 
 
+class RISORIUS_OT_move_outlines(FaceOperator, Operator):
+    """Put the outlines of an older file, which lie over the eyes, beside the face"""
+
+    bl_idname = "risorius.move_outlines"
+    bl_label = "Move Outlines Beside Face"
+    baked_too = True
+
+    def execute(self, context: Context) -> Result:
+        count = outlines.stand_beside(face_rig(context))
+        if not count:
+            self.report({"INFO"}, say("The outlines stand beside the face already."))
+            return {"CANCELLED"}
+        self.report({"INFO"}, say("{count} outlines moved", count=count))
+        return {"FINISHED"}
+
+
 def register() -> None:
     """Let the key of Frame Selected show the face where its outlines are selected."""
     config = current_context().window_manager.keyconfigs.addon
@@ -89,4 +105,4 @@ def unregister() -> None:
         keymap.keymap_items.remove(item)
 
 
-CLASSES = (RISORIUS_OT_frame_face, RISORIUS_OT_hide_outlines)
+CLASSES = (RISORIUS_OT_frame_face, RISORIUS_OT_hide_outlines, RISORIUS_OT_move_outlines)

@@ -189,6 +189,7 @@ class RISORIUS_MT_face_character(Menu):
         layout.operator("risorius.separate", icon="UNLINKED")
         layout.operator("risorius.make_override", icon="LIBRARY_DATA_OVERRIDE")
         layout.operator("risorius.bring_back")
+        layout.operator("risorius.move_outlines")
         layout.operator("risorius.reload", icon="FILE_REFRESH")
         layout.operator("risorius.replace_dna", icon="FILEBROWSER")
 

@@ -7,6 +7,7 @@ from ... import native
 from ...scene.animation import tweaks
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import outlines
+from .. import words
 from ..blender_types import Context, Icon, Menu, UILayout
 from ..common import active_controls
 from . import entries
@@ -70,9 +71,14 @@ def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
 
 
 def draw_header(self: Menu, context: Context) -> None:
-    """The menu's name in the header. Args: self, context  of the header's menus."""
+    """The menu's name in the header. Args: self, context  of the header's menus.
+
+    Blender's search shows and searches the words of the buttons that lead to an entry: so who types
+    the add-on's name finds all of it.
+    """
     if context.mode in _MODES:
-        self.layout.menu(RISORIUS_MT_face.bl_idname)
+        text = words.say("Face (Risorius)")
+        self.layout.menu(RISORIUS_MT_face.bl_idname, text=text, translate=False)
 
 
 def register() -> None:

@@ -19,6 +19,7 @@ from .surface import Doubles
 
 _REST, _MOVES, _BOUND = 0, 1, 2
 _MOST_STEPS = 600
+_MOST_MORE = 60  # steps of a walk to a given distance: where it is longer, its end is not cheap
 _END = 1e-6  # of the price at which the first moves: where the path counts as walked to its end
 _FAR = 0.1  # of the whole way: a target that stays farther away than this is out of reach
 _LITTLE = 0.1  # of what can be gained: what may be missed there for the sake of few controls
@@ -179,6 +180,28 @@ def cheapest_change(
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
     return np.clip(_where(nodes, aim) / price, low, high)  # rounding must not leave the bounds
+
+
+def cheapest_to(
+    a: Doubles, b: Doubles, low: Doubles, high: Doubles, price: Doubles, aim: float
+) -> Doubles:
+    """The cheapest x that brings a x as near to b as asked for, or as near as any: float64[n].
+
+    Args:
+        a: float64[m, n].
+        b: float64[m].
+        low, high: float64[n], at most and at least 0.
+        price: float64[n] above 0, of a unit of each.
+        aim: the distance.
+    """
+    path = _Path(a / price, b.copy(), low * price, high * price)
+    nodes, end = [(path.x.copy(), path.missing)], _END * path.price
+    for _ in range(_MOST_MORE):
+        if path.price <= end or np.linalg.norm(path.missing) <= aim:
+            break
+        path.step(end)
+        nodes.append((path.x.copy(), path.missing))
+    return np.clip(_where(nodes, aim) / price, low, high)
 
 
 def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: float) -> float:

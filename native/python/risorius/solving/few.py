@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: MIT
+"""The few controls that do a drag, and more of them where few end behind what all would do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from .._native import least_change
+from .pull import ON, Drag, least_squares, seen_from
+from .sparse import cheapest_change, cheapest_to
+from .surface import Doubles
+
+_HARD = 0.1  # of the largest ease: controls of less belong elsewhere
+# Of a sparse drag: what of the way, and how many mm, may be missing for the sake of fewer controls,
+# and how much nearer those that belong elsewhere have to bring the points together.
+_MISSING, _MISSING_MM = 0.02, 0.6
+_HELP, _HELP_MM = 0.02, 1.3
+_DEAR = 100.0  # what those elsewhere cost: they come after all others
+# What a control has to do, of what the strongest could, to take part, and one of those elsewhere.
+_WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
+# Where few controls end farther from the targets than all of them would by this, more come. Below
+# it nobody looks for what all of them would do.
+BEHIND_MM = 1.3
+_MORE = 3  # how often more controls come by derivatives, before those of all are taken
+_NOTHING_MM = 0.02  # a look at more controls that brings the points less near is the last
+_WEAKEST = 0.01  # of the strongest's reach: what does less is not among them
+_STILL = 1e-4  # of a control: a look that changes less is the last
+_GONE = 0.01  # the price of a control that moved already
+_HALVES = 5  # looks for the nearest pose on a way
+_FEW = 2  # controls: where more were found, it is tried whether fewer do
+_FREED = 4.0  # a control that was found has so much more room when all of them are fitted
+
+
+def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
+    """The cheapest change that comes near enough, then of the controls that it moves the best.
+
+    A control costs the root of how far it brings the points, by its ease: of several that go one
+    way a strong one is preferred to weak ones that go to their limits. The controls are found as
+    the face is at the begin, once: so they depend continuously on the targets, but for those that
+    prove to be superfluous on the face itself, which bends.
+
+    Args:
+        drag: the drag.
+        begin: float64[R], the pose at its begin.
+        smallest, rounds: as of solve_drag.
+    """
+    price, elsewhere = prices(drag)
+    units = drag.unknowns.alike()
+    drag = replace(drag, unknowns=units)
+    jacobian, missing = seen_from(drag, begin, begin)
+    way, unit = float(np.linalg.norm(missing)), float(np.linalg.norm(drag.roots)) / drag.mm
+    low, high = units.limits(drag.low - begin, drag.high - begin)
+    far = np.linalg.norm(jacobian, axis=0)
+    reach = far * np.maximum(high, -low)
+    least = np.where(elsewhere, _WEAK_ELSEWHERE, _WEAK) * reach.max(initial=0.0)
+    some = np.flatnonzero(reach > least)
+    price *= np.sqrt(far)
+    x = np.zeros(len(far))
+    x[some] = cheapest_change(
+        jacobian[:, some], missing, low[some], high[some], price[some], elsewhere[some],
+        min(_MISSING * way, _MISSING_MM * unit), min(_HELP * way, _HELP_MM * unit),
+    )  # fmt: skip
+    at = _fitted(drag, begin, x, smallest, rounds)
+    enough = min(_MISSING * way, _MISSING_MM * unit)
+    order = np.lexsort((np.abs(x) * far, ~elsewhere))
+    is_there = drag.far(at) <= BEHIND_MM and np.count_nonzero(x) > _FEW
+    for one in order[x[order] != 0] if is_there else ():
+        fewer = np.where(np.arange(len(x)) == one, 0.0, x)
+        there = _fitted(drag, begin, fewer, smallest, rounds)
+        if drag.left(there) <= max(enough**2, drag.left(at)):
+            at, x = there, fewer
+    return at
+
+
+def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int) -> Doubles:
+    """The best pose of the controls that a change by derivatives moves, float64[U], about there.
+
+    By whole steps of Gauss-Newton, whose end is continuous in the targets; where they end far from
+    these, by halved ones, if that is nearer.
+    """
+    units, change = drag.unknowns, drag.unknowns.change(x, len(begin))
+    drag = drag.held([*map(int, np.flatnonzero(change == 0))], begin)
+    least, most = units.limits(drag.low - begin, drag.high - begin)
+    low, high = np.clip(_FREED * x, least, 0.0), np.clip(_FREED * x, 0.0, most)
+    at, ridge = begin + change, -1.0
+    for _ in range(max(1, rounds - 1)):
+        jacobian, missing = seen_from(drag, begin, at)
+        if ridge < 0:
+            strongest = float((jacobian**2).sum(axis=0).max(initial=0.0))
+            ridge = max(smallest**2 * strongest, 1e-20)
+        was, x = x, least_change(jacobian, missing, low, high, ridge)
+        at = begin + units.change(x, len(begin))
+        if float(np.abs(x - was).max(initial=0.0)) < _STILL:
+            break
+    if drag.far(at) <= BEHIND_MM:
+        return at
+    drag = replace(
+        drag,
+        low=np.maximum(drag.low, begin + np.minimum(_FREED * change, 0.0)),
+        high=np.minimum(drag.high, begin + np.maximum(_FREED * change, 0.0)),
+    )
+    return min(at, least_squares(drag, begin, begin + change, smallest, rounds), key=drag.far)
+
+
+def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
+    """What each unknown costs by its ease, and which belong elsewhere: float64[U], bool[U].
+
+    Args:
+        drag: the drag.
+    """
+    eases = drag.unknowns.ease
+    elsewhere = eases < _HARD * eases.max()
+    return np.where(elsewhere, _DEAR, eases.max() / eases), elsewhere
+
+
+def nearer(
+    drag: Drag,
+    price: Doubles,
+    begin: Doubles,
+    few: Doubles,
+    every: Doubles,
+    pairs: npt.NDArray[np.int64],
+) -> Doubles:
+    """More controls, until the points are as near as all of them bring them, but for BEHIND_MM.
+
+    Args:
+        drag: whose unknowns are alike.
+        price: float64[U], of an unknown.
+        begin: the pose at the begin.
+        few: the pose of few controls.
+        every: the pose of all of them.
+        pairs: of opposites.
+    """
+    aim = drag.far(every) + BEHIND_MM
+    if drag.far(few) <= aim:
+        return few
+    drag, at = _agreeing(drag, begin, few, every, pairs)
+    for _ in range(_MORE):
+        there = _with_more(drag, price, begin, at, aim)
+        if drag.far(there) > drag.far(at) - _NOTHING_MM:
+            break
+        at = there
+        if drag.far(at) <= aim:
+            return at
+    return _towards(drag, at, _without_weak(drag, begin, every, aim), aim)
+
+
+def _agreeing(
+    drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
+) -> tuple[Drag, Doubles]:
+    """The drag and a pose without the opposites of what is on in another pose."""
+    on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
+    off = [
+        int(pair[1 - side])
+        for pair, both in zip(pairs, on, strict=True)
+        for side in (0, 1)
+        if both[side]
+    ]
+    at = few.copy()
+    at[off] = np.minimum(few, every)[off]
+    return drag.held(off, at), at
+
+
+def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
+    """A pose with as many more controls as bring the points as near as asked for by derivatives.
+
+    Those that moved already cost next to nothing.
+    """
+    units, count = drag.unknowns, len(begin)
+    jacobian, missing = units.columns(drag.jacobian(at)), drag.residual(drag.positions(at))
+    low, high = units.limits(drag.low - at, drag.high - at)
+    far = np.linalg.norm(jacobian, axis=0)
+    reach = far * np.maximum(high, -low)
+    some = np.flatnonzero(reach > _WEAKEST * reach.max(initial=0.0))
+    moved = np.abs(units.values(at - begin)) > ON
+    price = np.where(moved, _GONE, price) * np.sqrt(far)
+    x = np.zeros(len(far))
+    x[some] = cheapest_to(
+        jacobian[:, some], missing, low[some], high[some], price[some],
+        aim * float(np.linalg.norm(drag.roots)) / drag.mm,
+    )  # fmt: skip
+    step = units.change(x, count)
+    poses = [at + share * step for share in (1.0, 0.5, 0.25)]
+    return min(poses, key=drag.far)
+
+
+def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
+    """A pose without as many of its weakest controls as half of what may be missing allows."""
+    units = drag.unknowns
+    change = units.values(every - begin)
+    order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))
+
+    def without(number: int) -> Doubles:
+        kept = change.copy()
+        kept[order[:number]] = 0.0
+        return begin + units.change(kept, len(begin))
+
+    none, all_of = 0, len(order)
+    while all_of - none > 1:
+        half = (none + all_of) // 2
+        enough = drag.far(without(half)) <= aim - BEHIND_MM / 2
+        none, all_of = (half, all_of) if enough else (none, half)
+    return without(none)
+
+
+def _towards(drag: Drag, at: Doubles, other: Doubles, aim: float) -> Doubles:
+    """The first of some poses on the way to another one that is as near as asked for."""
+    if drag.far(at) <= aim:
+        return at
+    none, whole = 0.0, 1.0
+    for _ in range(_HALVES):
+        half = (none + whole) / 2
+        none, whole = (none, half) if drag.far(at + half * (other - at)) <= aim else (half, whole)
+    return at + whole * (other - at)

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: MIT
+"""Labels of the add-on: each word that counts begins with a capital, one thing has one name."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ADDON = Path(__file__).resolve().parents[2] / "addon" / "risorius"
+SMALL = {*"a an and as at but by for from in into nor of on or over per the to with".split()}
+LABEL = re.compile(
+    r"(?:Mode\(words\.say|words\.show\([^\"]{1,40}say|text=words\.say|bl_label = |heading=|"
+    r'[( ]text=|status\.\w+, words\.say)\(?"([^"]+)"'
+)
+# German: what the rows call it, and what they do not.
+NAMES = {"Tafel": "Brett", "Regler": "Schieberegler"}
+
+
+def lower_words(text):
+    """Words of the labels in a source that begin small, with their labels."""
+    for label in LABEL.findall(text):
+        bare = re.sub(r"\([^)]*\)", "", label)
+        if "{" in label or label.endswith((".", "?", ":", "…")):
+            continue  # it says something: a sentence, or how much
+        for word in re.findall(r"[A-Za-z][A-Za-z'-]*", bare)[1:]:
+            if word[0].islower() and word not in SMALL:
+                yield word, label
+
+
+def test_labels_are_in_title_case():
+    found = {
+        f"{path.name}: {label}"
+        for path in (ADDON / "ui").rglob("*.py")
+        for _word, label in lower_words(path.read_text("utf-8"))
+    }
+    assert found == set()
+    assert [*lower_words('words.show(row, words.say("First steps"), "LIGHT")')]
+
+
+@pytest.mark.parametrize(("name", "other"), NAMES.items())
+def test_one_thing_has_one_name_in_german(name, other):
+    text = (ADDON / "language" / "interface_de.toml").read_text("utf-8")
+    assert name in text
+    assert other not in text
