@@ -100,6 +100,24 @@ def rig_name(path):
         return next(name for name in held.objects if name.endswith("_rig"))
 
 
+def test_a_copy_that_is_deleted_leaves_the_outlines_to_the_face(rig, tmp_path):
+    """Shift-D shares them, and a save removes what is left of a face that was deleted."""
+    held = [b.custom_shape for b in scene.controls(rig).pose.bones]
+    for item in bpy.context.view_layer.objects:
+        item.select_set(True)
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    bpy.ops.object.delete()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "face.blend"))
+    assert len([o for o in bpy.data.objects if "risorius_controls" in o]) == 1
+    assert [b.custom_shape for b in scene.controls(rig).pose.bones] == held
+    for item in bpy.context.view_layer.objects:
+        item.select_set(True)
+    bpy.ops.object.delete()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "none.blend"))
+    assert not [o for o in bpy.data.objects if "_shape_" in o.name]
+
+
 def test_hidden_outlines_leave_bones_and_sizes_as_they_were(rig):
     controls = scene.controls(rig)
     controls.pose.bones["neck"].custom_shape_scale_xyz = (3.0, 2.0, 1.0)

@@ -288,7 +288,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
 
 def remove(rig: ArmatureObject) -> None:
-    """Take a character and all that belongs to it out of the file."""
+    """Take a character and all that belongs to it out of the file; what a copy of it uses stays."""
     controls = parts.controls_of(rig)
     text = storage.text_of(rig)
     items = parts.meshes_of(rig)
@@ -298,8 +298,8 @@ def remove(rig: ArmatureObject) -> None:
     circles = {b.custom_shape for b in controls.pose.bones if b.custom_shape} if controls else ()
     data += [c.data for c in circles]
     images = [n.image for n in sharing.nodes_of(rig)]
-    _remove([i for i in (*items, rig, controls, *circles) if i is not None])
-    for left in (data, used, images):
+    _remove([i for i in (*items, rig, controls) if i is not None])
+    for left in (circles, data, used, images):
         _remove([d for d in dict.fromkeys(left) if d is not None and d.users == 0])
     if text is not None and not any(r.get(parts.DNA) == text for r in parts.rigs()):
         _remove([text])

@@ -59,6 +59,7 @@ def shot(hand: Hand, _dna: Path) -> Iterator[Check]:
         key_all(hand)
     scroll(hand)
     hand.picture("animator-expressions")
+    scroll(hand, -40)
     go_to(hand, 170)
     hand.click(*hand.find(r"risorius\.reset\(", columns=(0.5, 0.45)))
     key_all(hand)
