@@ -24,7 +24,12 @@ _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
 # Lips and cheeks keep light from what lies deep in a mouth. Where nothing casts shadows (Material
 # Preview, exports) molars would be as bright as incisors, a white wall behind the corner.
-_SHADED = ((0.16, (1.0,) * 3), (0.36, (0.5, 0.44, 0.4)), (0.62, (0.2, 0.15, 0.13)))
+_SHADED = (
+    (0.12, (1.0,) * 3),
+    (0.24, (0.77, 0.75, 0.73)),
+    (0.35, (0.46, 0.42, 0.39)),
+    (0.62, (0.18, 0.13, 0.11)),
+)
 _CORNEA_IOR = 1.376
 _COARSE = 1500  # vertices: a mesh of teeth with fewer has no single teeth
 

@@ -97,6 +97,7 @@ def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
     counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
     over = sum(counts.values()) - _MOST_VERTICES
     if over > 0 and "hair" in strips:
+        over += 2 * strips["hair"].rows  # the count of strips is rounded
         share = max(0.2, 1 - over / counts["hair"])
         strips = strips | {"hair": strips["hair"].coarser(share, strips["hair"].rows)}
     return strips
