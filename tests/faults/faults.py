@@ -23,7 +23,7 @@ from functools import partial
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "python"))
+sys.path[:0] = [str(HERE.parent / "python"), str(HERE.parent / "python" / "support")]
 
 from bombs import BOMBS, MiB  # noqa: E402
 from mutants_of_inputs import trials  # noqa: E402

@@ -34,7 +34,7 @@ LICENCES = {"LICENSE", "native/NOTICES.txt"}
 # What the package has beside its module, what its self-test compares with, and the page of web.sh.
 OWN = re.compile(
     r"risorius/(.+\.(py|pyi|toml)|py\.typed|selftest/golden/\w+\.(dna|f32|sha256)"
-    r"|sample/joints\.npz|web/page\.html)"
+    r"|web/page\.html)"
 )
 MACHINES = {"win_amd64": "AMD64", "win_arm64": "ARM64"}
 PROCESSORS = {"macosx_11_0_arm64": "ARM64", "macosx_11_0_x86_64": "X86_64"}

@@ -7,6 +7,7 @@ import pkgutil
 
 import pytest
 import risorius
+import risorius_people
 from risorius import RisoriusError, cli
 from risorius.cli import info
 from risorius.cli.files import CommandLineError, InputError
@@ -31,13 +32,18 @@ OLD_BASES = {
 
 
 def error_classes():
-    """Every class of errors that a module of the package makes, by name."""
+    """Every class of errors that a module of the packages makes, by name."""
     found = {}
-    for module in pkgutil.walk_packages(risorius.__path__, "risorius."):
+    modules = [
+        module
+        for package in (risorius, risorius_people)
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
+    ]
+    for module in modules:
         if module.name == "risorius.__main__":
             continue
         for name, value in vars(importlib.import_module(module.name)).items():
-            ours = inspect.isclass(value) and value.__module__.split(".")[0] == "risorius"
+            ours = inspect.isclass(value) and value.__module__.startswith("risorius")
             if ours and issubclass(value, BaseException):
                 found[name] = value
     return found
