@@ -9,8 +9,8 @@ from . import native
 from .language import tables
 from .scene.animation import layer_properties, range_properties
 from .scene.base import compat, console, session
-from .scene.character import gaze_settings
-from .scene.life import handlers
+from .scene.events import handlers
+from .scene.gaze import gaze_settings
 from .scene.live import capture
 from .scene.speech import spoken_properties
 from .ui import (
@@ -25,12 +25,12 @@ from .ui import (
     file,
     hand,
     layers,
-    life,
     live,
     menu,
     mixing,
+    see_why,
     speech,
-    why,
+    upkeep,
     words,
 )
 from .ui.about import manual, preferences, timing_overlay
@@ -47,9 +47,9 @@ from .ui.file import operators as file_operators
 from .ui.live import properties as live_properties
 from .ui.menu import face_menu
 from .ui.mixing import properties as mixing_properties
-from .ui.why import overlay as why_overlay
-from .ui.why import panel as why_panel
-from .ui.why import properties as why_properties
+from .ui.see_why import overlay as why_overlay
+from .ui.see_why import panel as why_panel
+from .ui.see_why import properties as why_properties
 
 # Panels of one bl_order stand in the order in which they are registered.
 CLASSES = (
@@ -58,7 +58,7 @@ CLASSES = (
     *spoken_properties.CLASSES,
     *about.CLASSES,
     *file.CLASSES,
-    *life.CLASSES,
+    *upkeep.CLASSES,
     *bake.CLASSES,
     *export.CLASSES,
     *drag.CLASSES,
@@ -69,7 +69,7 @@ CLASSES = (
     *speech.CLASSES,
     *expressions.CLASSES,
     *layers.CLASSES,
-    *why.CLASSES,
+    *see_why.CLASSES,
     *live.CLASSES,
     *mixing.CLASSES,
     *menu.CLASSES,

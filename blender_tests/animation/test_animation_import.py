@@ -560,7 +560,7 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 def _gives_the_face_back(rig, last):
     """Before and after a voice the face shows what its sliders say."""
     scene.set_controls(rig, mouthCornerPullL=0.6)
-    present = scene.submodule("scene.why.present")
+    present = scene.submodule("scene.see_why.present")
     shown = {}
     for frame in (5, 31 + 12, last + 20):
         bpy.context.scene.frame_set(frame)

@@ -87,7 +87,7 @@ def test_a_layer_shows_the_voice_at_every_frame(rig):
     bpy.ops.risorius.speak(filepath="bob.wav", target="LAYER", start=11.0, use_sound=False)
     (layer,) = scene.controls(rig).risorius_layers
     layer.fade_in = layer.fade_out = 0.0
-    present = scene.submodule("scene.why.present")
+    present = scene.submodule("scene.see_why.present")
     for frame in (14, 19, 23, 30, 37):
         bpy.context.scene.frame_set(frame)
         now = present.of(rig)
@@ -165,7 +165,7 @@ def test_a_replaced_sound_changes_the_mouth_around_it_and_nothing_else(rig):
         assert max(rows) < frame_of(8) + 12, path
     found = [curves(action)[JAW_PATH, 0].evaluate(f) for f in frames]
     assert np.abs(found - jaw_of(action)[: len(frames)]).max() < 0.0101
-    present = scene.submodule("scene.why.present")
+    present = scene.submodule("scene.see_why.present")
     bpy.context.scene.frame_set(29)  # what is seen
     now = present.of(rig)
     assert now.raw[now.live.labels.index(JAW)] == pytest.approx(found[29 - 11], abs=1e-5)
@@ -199,7 +199,7 @@ def test_every_frame_stays_every_frame_and_a_layer_is_corrected_too(rig):
     assert [row[0] for row in after] == [row[0] for row in before]
     assert {row[6] for row in after} == {"LINEAR"}
     bpy.context.scene.frame_set(29)
-    now = scene.submodule("scene.why.present").of(rig)
+    now = scene.submodule("scene.see_why.present").of(rig)
     jaw = now.raw[now.live.labels.index(JAW)]
     assert jaw == pytest.approx(jaw_of(layer.action)[18], abs=0.005)
     assert jaw < before[18][1] - 0.05

@@ -75,11 +75,11 @@ def _fill(dna_file):
     bpy.context.view_layer.objects.active = scene.controls(rig)
     scene.set_controls(rig, jawOpen=0.5, mouthCornerPullL=0.4)
     assert bpy.ops.risorius.key(region="jaw") == {"FINISHED"}
-    assert len(scene.submodule("scene.why.causes").strongest(rig)) == 1
+    assert len(scene.submodule("scene.see_why.causes").strongest(rig)) == 1
     assert bpy.ops.risorius.heat(kind="POSE") == {"FINISHED"}
     assert bpy.ops.risorius.copy_pose() == {"FINISHED"}
     assert not scene.submodule("scene.frame.caches").note_old(rig)
-    scene.submodule("ui.why.panel")._ask_soon()
+    scene.submodule("ui.see_why.panel")._ask_soon()
     _frame()
     return rig
 
@@ -107,7 +107,7 @@ def test_a_load_leaves_nothing_of_the_file_before(dna_file):
     live = weakref.ref(scene.submodule("scene.character.runtime").of(rig))
     full = _held(session, "load")
     kept = {"present.known", "displacement.skins", "why.panel.soon", "caches.late"}
-    assert kept | {"written.inputs", "heat.shown"} <= full
+    assert kept | {"last_written.inputs", "heat.shown"} <= full
     assert [name for name in MISSED if "load" not in session.ends_of(name)] == []
     _load()
     assert _held(session, "load", "undo", "free") == set()
@@ -115,7 +115,7 @@ def test_a_load_leaves_nothing_of_the_file_before(dna_file):
     bpy.context.view_layer.update()
     gc.collect()
     assert live() is None
-    panel = scene.submodule("ui.why.panel")
+    panel = scene.submodule("ui.see_why.panel")
     panel._ask_soon()  # Blender drops the timer with the file: it is asked for again
     assert bpy.app.timers.is_registered(panel._ask)
 

@@ -184,7 +184,7 @@ def test_in_an_older_file_sliders_that_were_keyed_go_on_leading(face, keyed):
         scene.face(rig).keyframe_insert('["head.qx"]', frame=1)
     form = scene.submodule("scene.base.form")
     controls[form.VERSION] = 2
-    said = scene.submodule("scene.life.migrations").bring_up_all()
+    said = scene.submodule("scene.upkeep.migrations").bring_up_all()
     assert controls.risorius_neck_poses is not keyed
     assert bool(said) is keyed
 
@@ -208,7 +208,7 @@ def test_see_why_names_neck_poses_and_solo_shows_them_alone(face):
     for bone, joint, part in (("neck", NECK, slice(0, 4)), ("head", HEAD, slice(4, 8))):
         _pose(rig, bone, _armature_turn(dna, joint, NECK_POSES[UP][part]))
     scene.set_controls(rig, jawOpen=0.5)
-    causes = scene.submodule("scene.why.causes")
+    causes = scene.submodule("scene.see_why.causes")
     firing = {cause.name: cause for cause in causes.strongest(rig)}
     assert firing["neck_up"].value == pytest.approx(1.0, abs=NEAR)
     assert firing["neck_up"].now > 0.1

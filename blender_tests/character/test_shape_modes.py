@@ -254,7 +254,7 @@ def _end_by_hand(_rig, _folder):
 
 
 def _end_by_render(_rig, _folder):
-    handlers = scene.submodule("scene.life.handlers")
+    handlers = scene.submodule("scene.events.handlers")
     ours = [h for h in bpy.app.handlers.render_init if h is handlers._end_tests]
     assert len(ours) == 1
     ours[0](bpy.context.scene)

@@ -94,7 +94,7 @@ def test_wheel_of_another_version_is_said_in_words(monkeypatch):
 
 def test_with_the_wrong_wheel_edits_of_a_face_are_not_looked_at(dna_file, monkeypatch):
     rig, looked = scene.load(dna_file), []
-    handlers = scene.submodule("scene.life.handlers")
+    handlers = scene.submodule("scene.events.handlers")
     monkeypatch.setattr(handlers, "_notice_copies", looked.append)
     scene.set_controls(rig, jawOpen=0.5)
     assert looked
@@ -193,7 +193,7 @@ def test_an_exception_in_a_handler_does_not_pass_unseen(
 
     monkeypatch.setattr(scene.submodule("scene.frame.evaluate"), "evaluate_all", fail)
     monkeypatch.setattr(scene.submodule("scene.frame.evaluate"), "evaluate", fail)
-    monkeypatch.setattr(scene.submodule("scene.life.repair"), "remove_dead", fail)
+    monkeypatch.setattr(scene.submodule("scene.upkeep.repair"), "remove_dead", fail)
     assert not tracebacks
     if handler == "frame":
         bpy.context.scene.frame_set(3)

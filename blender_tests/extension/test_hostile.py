@@ -125,7 +125,7 @@ def test_a_face_that_left_is_not_kept(tmp_path):
         _take_out()
         bpy.context.view_layer.update()
     assert len(runtime._cache) <= 2
-    written = scene.submodule("scene.base.written")
+    written = scene.submodule("scene.base.last_written")
     kept = (written.inputs, written.places, written.weights, written.bone_writers)
     assert all(len(entries) <= 5 for entries in kept)
 

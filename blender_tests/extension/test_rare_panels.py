@@ -82,7 +82,7 @@ def test_a_list_has_a_line_for_each_layer_and_a_warped_one_its_points(rig):
 
 
 def test_a_face_that_follows_the_camera_shows_its_distances(rig, monkeypatch):
-    panel, lods = ui("face.panel"), scene.submodule("scene.character.lods")
+    panel, lods = ui("face.panel"), scene.submodule("scene.lod.lods")
     lods.follow_camera(rig, True, 0.25)
     del rig["risorius_lod_distances"]
     rig["risorius_lod_distances"] = [1.5, 3.0]

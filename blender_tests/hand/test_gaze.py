@@ -125,7 +125,7 @@ def test_both_eyes_look_at_the_target(rig, place):
 
 
 def test_without_steps_the_moving_centres_leave_an_angle(rig, monkeypatch):
-    monkeypatch.setattr(scene.submodule("scene.frame.gaze"), "STEPS", 1)
+    monkeypatch.setattr(scene.submodule("scene.gaze.gaze"), "STEPS", 1)
     move_target(rig, 0.25, 0, 0.2)
     assert max(misses(rig, target_point(rig))) > 0.3
 

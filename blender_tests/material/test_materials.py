@@ -575,7 +575,7 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """What scene/life/duplicates.py gives to the maps of a duplicate; no Python expression."""
+    """What scene/upkeep/duplicates.py gives to the maps of a duplicate; no Python expression."""
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
     drivers = list(scene.submodule("scene.material.materials").map_drivers(_materials(rig)["head"]))
     assert len(drivers) == 2

@@ -129,7 +129,7 @@ class World:
     def lod(self):
         rig = self._rig()
         self._activate(rig)
-        levels = scene.submodule("scene.character.lods").built(rig)
+        levels = scene.submodule("scene.lod.lods").built(rig)
         bpy.ops.risorius.set_lod(lod=self.random.choice(levels))
 
     def lod_by_distance(self):
@@ -252,7 +252,7 @@ class World:
         bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
         layer.update()
         for rig in self.rigs():  # levels that were hidden are hidden again
-            scene.submodule("scene.character.lods").show(rig)
+            scene.submodule("scene.lod.lods").show(rig)
         layer.update()
 
     def delete(self):

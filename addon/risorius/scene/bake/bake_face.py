@@ -18,10 +18,11 @@ from ...logic.animation import key_reduction
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..animation import actions
-from ..base import parts, saved, written
+from ..base import last_written, parts, saved
 from ..base.blender_types import Animated, ArmatureObject, Context, MeshObject
-from ..character import lods, runtime
+from ..character import runtime
 from ..frame import channel_preview, controls_ahead, evaluate
+from ..lod import lods
 from . import baked_shape_keys, baked_tracks, sampling
 
 RESULT, CONTROLS = "RESULT", "CONTROLS"
@@ -150,7 +151,7 @@ def bake(
             for rig in rigs:
                 _take_back(rig, options.kind)
             raise
-    written.forget()
+    last_written.forget()
     for rig in rigs:
         evaluate.bring_up(context, rig)
     return done
@@ -299,7 +300,7 @@ def unbake(context: Context, rig: ArmatureObject) -> bool:
         _restore_controls(parts.controls_there(rig))
     else:
         _restore_result(rig)
-    written.forget()
+    last_written.forget()
     context.view_layer.update()
     evaluate.bring_up(context, rig)
     return True

@@ -22,7 +22,8 @@ from ...logic.character import board_layout, primary_layout, primary_table
 from ...logic.character.board_layout import Board, Handle
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from . import armatures, board, bone_shapes, lods, runtime
+from ..lod import lods
+from . import armatures, board, bone_shapes, runtime
 
 COLLECTION = "Face Board"
 BORDER, FRAMES = runtime.BOARD_BONES

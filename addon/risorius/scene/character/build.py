@@ -13,10 +13,11 @@ from ... import native
 from ...logic.base import names
 from ...logic.character import plans
 from ...logic.material import texture_search
-from ..base import compat, form, parts, sharing, storage, written
+from ..base import compat, form, last_written, parts, sharing, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
+from ..lod import lods
 from ..material import materials
-from . import armatures, gaze_settings, lods, meshes, runtime
+from . import armatures, meshes, runtime
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,6 @@ def _build(
     assert options.unit is not None  # import_file has filled it in
     _connect(plan, rig, controls, text, file.path, options.unit)
     runtime.take(rig, file.dna, file.rig)
-    gaze_settings.begin(controls, runtime.there(rig))
     progress(0.4)
     built = []
     for number, mesh_plan in enumerate(plan.meshes):
@@ -283,7 +283,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
             trouble.append(
                 f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
             )
-    written.forget()
+    last_written.forget()
     return trouble
 
 

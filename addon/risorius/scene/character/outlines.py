@@ -11,7 +11,8 @@ import bpy
 from ...logic.character import plans
 from ..base import parts
 from ..base.blender_types import ArmatureObject
-from . import armatures, bone_shapes, lods, runtime
+from ..lod import lods
+from . import armatures, bone_shapes, runtime
 
 
 def are_hidden(controls: ArmatureObject) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from mathutils import Quaternion, Vector
 from numpy.typing import NDArray
 
-from ..base import parts, saved, written
+from ..base import last_written, parts, saved
 from ..base.blender_types import ArmatureObject, Depsgraph
 
 CONSTRAINT = "Risorius Body"
@@ -34,13 +34,13 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
         return
     wanted = np.array(seen.matrix_world, np.float64)  # float32 in Blender 5
     # Also what is only a rounding away is written: a frame shall not keep the one before it.
-    if written.is_new(written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
+    if last_written.is_new(last_written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
         rig.matrix_basis = seen.matrix_world
 
 
 def has_strayed(rig: ArmatureObject) -> bool:
     """Whether a rig that follows was moved by another hand. Args: rig  the original."""
-    last = written.places.get(rig.session_uid)
+    last = last_written.places.get(rig.session_uid)
     return isinstance(last, bytes) and _follows(rig) and not _is_at(rig, np.frombuffer(last))
 
 

@@ -19,7 +19,7 @@ from ...logic.base import names
 from ...logic.base.sentences import told
 from ...logic.base.space import Space, SpaceError, world_matrices, yaw_pitch
 from ...logic.character import board_layout, board_table, plans, primary_table
-from ..base import console, parts, saved, session, storage, written
+from ..base import console, last_written, parts, saved, session, storage
 from ..base.blender_types import ArmatureObject, MeshObject
 
 # The bones of the control armature beside those of a face board.
@@ -259,7 +259,7 @@ def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
         del _cache[key]
-    written.forget()
+    last_written.forget()
 
 
 def _compile(content: bytes, unit: float) -> Runtime:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, written
+from ..base import last_written, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
-from ..character import lods, runtime
+from ..character import runtime
+from ..lod import lods
 
 Float = NDArray[np.float64]
 Point = tuple[int, int]  # a mesh of the DNA, one of its vertices
@@ -48,7 +49,7 @@ class Skin:
             rig: the character.
             live: its Runtime.
         """
-        last = written.inputs.get(rig.session_uid)
+        last = last_written.inputs.get(rig.session_uid)
         level = lods.expected(rig, False, last[1] if isinstance(last, tuple) else None)
         level = min(max(level, 0), max(live.rig.lod_count - 1, 0))
         surface = live.surface(level)

@@ -18,7 +18,7 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ..animation import keying
-from ..base import parts, written
+from ..base import last_written, parts
 from ..base.blender_types import ArmatureObject, Context
 from ..character import runtime
 from ..frame import inputs
@@ -301,7 +301,7 @@ class Stroke:
     def _seen(self, context: Context) -> Float:
         """Where the point is after the face was evaluated."""
         self.skin.show(context)
-        if written.is_refused(self.rig):
+        if last_written.is_refused(self.rig):
             self.restore(context)
             raise FaceError(_REFUSED)
         at = self.skin.seen_at(self.point)

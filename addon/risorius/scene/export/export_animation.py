@@ -23,7 +23,7 @@ from ...logic.base.names import unique_labels
 from ...logic.base.sentences import told
 from ..animation import actions
 from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
-from ..base import compat, parts, written
+from ..base import compat, last_written, parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject, Override
 from ..character import meshes, runtime
 from ..frame import evaluate
@@ -118,7 +118,7 @@ def copies(
                 window.scene = shown
             _remove_all_but(before)
             loans.give_back()
-            written.forget()
+            last_written.forget()
 
 
 def _stage(user: bpy.types.Scene, frames: NDArray[np.float64]) -> bpy.types.Scene:

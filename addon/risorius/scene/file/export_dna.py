@@ -17,7 +17,8 @@ from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
 from ..base import console, parts, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from ..character import armatures, lods, runtime, skin_weights
+from ..character import armatures, runtime, skin_weights
+from ..lod import lods
 from . import refit_joints, refit_meshes
 
 

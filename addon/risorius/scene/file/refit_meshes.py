@@ -15,7 +15,8 @@ from ...logic.base.sentences import told
 from ...logic.character import plans, user_edits
 from ..base import parts, saved
 from ..base.blender_types import Attribute, MeshObject, Values
-from ..character import build, lods, meshes, runtime, skin_weights
+from ..character import build, meshes, runtime, skin_weights
+from ..lod import lods
 from . import transfer
 from .file_change import Change
 

@@ -18,10 +18,12 @@ from ...logic.base import names
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...logic.character import plans
-from ..base import console, drivers, parts, saved, storage, written
+from ..base import console, drivers, last_written, parts, saved, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from ..character import armatures, board, board_bones, build, lods, runtime
-from ..life import duplicates
+from ..character import armatures, board, board_bones, build, runtime
+from ..gaze import gaze_settings
+from ..lod import lods
+from ..upkeep import duplicates
 from . import refit_joints, refit_meshes
 from .file_change import Change
 
@@ -60,6 +62,7 @@ def replace_file(
         fresh, warnings = build.import_file(
             context, path, _options(rig, levels, unit), lambda share: progress(share * 0.7)
         )
+        gaze_settings.begin(parts.controls_there(fresh), runtime.there(fresh))
         after = runtime.there(fresh).with_board(before.board)
         now = tuple(lods.built(fresh))
         new = plans.plan_character(after.dna, rig.name, now, unit, after.rests)
@@ -117,7 +120,7 @@ def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
     refit_joints.replace_control_places(context, change)
     build.remove(fresh)
     lods.show(rig)
-    written.forget()
+    last_written.forget()
     for item in (rig, parts.controls_there(rig), *parts.meshes_of(rig)):
         item.update_tag()
 
@@ -182,7 +185,7 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
             rig.pop(key, None)
             rig[key] = levels[0]
     # Bones, channels and maps have other numbers now: nothing that was written before counts.
-    written.forget()
+    last_written.forget()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
     for key, value in change.new.origin.items():

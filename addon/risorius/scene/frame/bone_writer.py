@@ -12,7 +12,7 @@ from mathutils import Matrix, Quaternion
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, saved, written
+from ..base import last_written, parts, saved
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
 
@@ -133,9 +133,9 @@ def writer_of(rig: ArmatureObject, live: runtime.Runtime) -> Writer:
         rig: deforming armature.
         live: the character's Runtime.
     """
-    kept = written.bone_writers.get(rig.session_uid)
+    kept = last_written.bone_writers.get(rig.session_uid)
     if not isinstance(kept, Writer) or kept.count != len(rig.pose.bones):
-        kept = written.bone_writers[rig.session_uid] = _make_writer(rig, live)
+        kept = last_written.bone_writers[rig.session_uid] = _make_writer(rig, live)
     return kept
 
 

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import parts, saved, written
+from ..base import last_written, parts, saved
 from ..base.blender_types import ArmatureObject
 
 _MOST = 1000.0  # a weight beyond it is nobody's test
@@ -43,7 +43,7 @@ def clear_all() -> bool:
     """End the overrides of all characters and bring the faces up without them."""
     ended = [rig for rig in parts.rigs() if clear(rig)]
     for rig in ended:
-        written.forget()
+        last_written.forget()
         controls = parts.controls_of(rig)
         if controls is not None:
             controls.update_tag()

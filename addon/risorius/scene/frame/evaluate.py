@@ -18,9 +18,10 @@ import numpy as np
 
 from ... import native
 from ..animation import layers
-from ..base import drivers, parts, saved, session, written
+from ..base import drivers, last_written, parts, saved, session
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
-from ..character import lods, rig_placement, runtime
+from ..character import rig_placement, runtime
+from ..lod import lods
 from . import (
     bone_writer,
     channel_preview,
@@ -147,11 +148,12 @@ def after_frame(depsgraph: Depsgraph) -> None:
         again = done is not None and done.wrote and drivers.moves(rig)
         if done is not None and not again and _is_as_before(rig, done, depsgraph):
             continue
-        was = written.inputs.get(rig.session_uid)
+        was = last_written.inputs.get(rig.session_uid)
         if again:
-            written.inputs.pop(rig.session_uid, None)  # what else moves its bones came over ours
+            # Other animation of its bones came over ours.
+            last_written.inputs.pop(rig.session_uid, None)
         if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
-            now = written.inputs.get(rig.session_uid)
+            now = last_written.inputs.get(rig.session_uid)
             lateness.count(rig, was, now, runtime.there(rig).labels)
     live_keys.reach(depsgraph)
 
@@ -215,7 +217,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     look = look_masks.for_frame(rig, rendering)
     state = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
     anew = moment is Moment.ANEW
-    if not written.is_new(written.inputs, rig, state) and not anew:
+    if not last_written.is_new(last_written.inputs, rig, state) and not anew:
         timing.looked(times[0])
         return False
     times.append(perf_counter())
@@ -225,7 +227,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     times.append(perf_counter())
     keyed = joint_readings.of(rig, live).keyed
     taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
-    written.note_refusal(rig, taken)
+    last_written.note_refusal(rig, taken)
     if not taken:
         return False  # channels and maps shall not move without the bones
     _write_values(rig, pose)
@@ -243,7 +245,7 @@ def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment
     """The level of detail to show. Args: see evaluate; seen  its controls, evaluated."""
     if moment not in _BEFORE_FRAME:
         return lods.choose(rig, seen, depsgraph)
-    last = written.inputs.get(rig.session_uid)
+    last = last_written.inputs.get(rig.session_uid)
     known = last[1] if isinstance(last, tuple) else None
     return lods.expected(rig, moment is Moment.RENDER, known)
 
@@ -267,7 +269,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
 
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
     """Objects of a character, an override, that Blender lets nobody write to."""
-    return [item for item in (rig, *parts.meshes_of(rig)) if written.is_refused(item)]
+    return [item for item in (rig, *parts.meshes_of(rig)) if last_written.is_refused(item)]
 
 
 def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:

@@ -13,7 +13,8 @@ from ..animation import layer_mixing, layers
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import board, rig_placement, runtime
-from . import gaze, joint_turns
+from ..gaze import gaze
+from . import joint_turns
 
 Turns = dict[str, Quaternion]  # "neck", "head": in the armature's axes
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..base import compat, console, drivers, parts, written
+from ..base import compat, console, drivers, last_written, parts
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
 from . import bone_writer, joint_circles
@@ -45,7 +45,7 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Reading:
         rig: deforming armature.
         live: the character's Runtime.
     """
-    kept = written.readings.get(rig.session_uid)
+    kept = last_written.readings.get(rig.session_uid)
     if isinstance(kept, Reading) and kept.is_fresh:
         return kept
     return look(rig, live, edited=True)
@@ -60,7 +60,7 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
         edited: whether the file was edited since the last look: else only what stands on the face
             itself is compared.
     """
-    kept = written.readings.get(rig.session_uid)
+    kept = last_written.readings.get(rig.session_uid)
     before = kept if isinstance(kept, Reading) else None
     if before is None and not live.turning and not drivers.moves(rig):
         return Reading((), (), frozenset(), {}, "")
@@ -80,7 +80,7 @@ def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
         else:
             places[item.joint] = place
     found = Reading(held, _wiring(rig, held), keyed, places, next(iter(circles), ""))
-    written.readings[rig.session_uid] = found
+    last_written.readings[rig.session_uid] = found
     if found.circle and (before is None or before.circle != found.circle):
         console.say(f"{rig.name}: {joint_circles.words(found.circle)}")
     return found
@@ -94,7 +94,7 @@ def reads(rig: ArmatureObject) -> bool:
 
 def note_edit() -> None:
     """Something was edited: what turns the joints of faces is looked at anew when it is needed."""
-    for kept in written.readings.values():
+    for kept in last_written.readings.values():
         if isinstance(kept, Reading):
             kept.is_fresh = False
 
@@ -105,7 +105,7 @@ def words(rig: ArmatureObject) -> str:
     Args:
         rig: deforming armature.
     """
-    kept = written.readings.get(rig.session_uid)
+    kept = last_written.readings.get(rig.session_uid)
     if not isinstance(kept, Reading) or not kept.circle:
         return ""
     return joint_circles.words(kept.circle)

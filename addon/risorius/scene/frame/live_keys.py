@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import parts, saved, written
+from ..base import last_written, parts, saved
 from ..base.blender_types import Depsgraph, MeshObject
 from ..character import meshes, runtime
 from . import bone_writer, caches
@@ -50,7 +50,7 @@ def write(
         weights = weights.copy()
         weights[saved.wholes(key, parts.REAL, 0, len(weights) - 1)] = 0.0
     state = weights[morph.channel_indices].tobytes()
-    if not written.is_new(written.weights, key, state) and not force:
+    if not last_written.is_new(last_written.weights, key, state) and not force:
         return
     basis = meshes.points_of(key.reference_key)
     points = morph.evaluate(weights, base=basis)
@@ -58,10 +58,10 @@ def write(
     if ahead and not linked and bears_simulation(item):
         _write_unheard(key, block, points)
         return
-    written.unheard.discard(key.session_uid)
+    last_written.unheard.discard(key.session_uid)
     block.points.foreach_set("co", points.ravel())
     if linked:
-        written.note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
+        last_written.note_refusal(item, bone_writer.is_there(block.points, "co", points.ravel()))
     key.update_tag()
     item.data.update_tag()
 
@@ -79,11 +79,11 @@ def reach(depsgraph: Depsgraph) -> None:
     Args:
         depsgraph: what Blender has evaluated.
     """
-    if not written.unheard:
+    if not last_written.unheard:
         return
     for item in (item for rig in parts.rigs() for item in parts.meshes_of(rig)):
         key, block = item.data.shape_keys, meshes.live_block(item)
-        if key is None or block is None or key.session_uid not in written.unheard:
+        if key is None or block is None or key.session_uid not in last_written.unheard:
             continue
         seen = key.evaluated_get(depsgraph)
         if seen.is_evaluated:
@@ -99,7 +99,7 @@ def _write_unheard(
     """Write points without an update: to the memory of the key, and to its copies in graphs."""
     points = np.ascontiguousarray(points, np.float32)
     ctypes.memmove(block.points[0].as_pointer(), points.ctypes.data, points.nbytes)
-    written.unheard.add(key.session_uid)
+    last_written.unheard.add(key.session_uid)
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
     for graph in (layer.depsgraph for layer in layers):
         seen = key.evaluated_get(graph) if graph is not None else key

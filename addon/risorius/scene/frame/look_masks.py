@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, saved, session, written
+from ..base import last_written, parts, saved, session
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
@@ -165,7 +165,7 @@ def give_back() -> bool:
 
 def bring_up_later(rig: ArmatureObject) -> None:
     """Let the next update evaluate a character anew."""
-    written.forget()
+    last_written.forget()
     controls = parts.controls_of(rig)
     if controls is not None:
         controls.update_tag()

@@ -7,7 +7,8 @@ import numpy as np
 from ... import native
 from ...scene.base import console, parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import lods, meshes, runtime
+from ...scene.character import meshes, runtime
+from ...scene.lod import lods
 from .. import words
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig, usable

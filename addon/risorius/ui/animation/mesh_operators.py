@@ -12,7 +12,7 @@ from ...scene.animation import mesh_curves
 from ...scene.base import parts
 from ...scene.base.blender_types import MeshObject
 from .. import words
-from ..beside import RunsBeside
+from ..background_work import RunsBeside
 from ..blender_types import Context, Operator, Result
 from ..common import explain, face_rig, shown_progress
 from .place_clip import PlacesClip

@@ -17,7 +17,7 @@ from ...scene.base.task import Task
 from ...scene.character import runtime
 from ...scene.expressions import assets, library, poses, thumbnails
 from ...scene.frame import inputs
-from ..beside import RunsBeside
+from ..background_work import RunsBeside
 from ..blender_types import Context, Operator, OperatorBase, Result
 from ..common import FaceOperator, face_rig, system_path
 from ..words import of_error, say

@@ -14,7 +14,7 @@ from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import board, sides
 from ...scene.frame import look_masks
 from ...scene.live import sessions
-from ...scene.why import heat
+from ...scene.see_why import heat
 from .. import words
 from ..blender_types import Context, Icon, UILayout
 from ..common import as_seen

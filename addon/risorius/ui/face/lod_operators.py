@@ -7,8 +7,8 @@ import bpy
 
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import lods
 from ...scene.frame import evaluate
+from ...scene.lod import lods
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 from ..words import say

@@ -13,7 +13,7 @@ from ...scene.animation import keying
 from ...scene.base import parts
 from ...scene.character import board, build, runtime
 from ...scene.frame import evaluate
-from ...scene.life import duplicates, library_overrides
+from ...scene.upkeep import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
 from ..common import MODES, FaceOperator, face_controls, face_rig
 from ..hand.base import HandOperator

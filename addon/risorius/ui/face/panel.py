@@ -5,14 +5,15 @@ from ... import native
 from ...logic.character import plans
 from ...scene.base import parts, saved
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import lods, rig_placement, runtime
+from ...scene.character import rig_placement, runtime
 from ...scene.hair import strands
+from ...scene.lod import lods
 from .. import words
 from ..bake.panel import draw_late
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, FacePanel, active_controls, face_controls, face_rig
 from ..drag import panel as drag_panel
-from ..life.panel import draw_trouble
+from ..upkeep.panel import draw_trouble
 from . import banner
 
 

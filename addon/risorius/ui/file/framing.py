@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ...logic.character import view_fit
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import board_bones, lods
+from ...scene.character import board_bones
+from ...scene.lod import lods
 from ..blender_types import Context
 
 _FRONT = Vector((0.0, -1.0, 0.0))  # where an imported face looks

@@ -10,11 +10,12 @@ import bpy
 from ... import native
 from ...logic.base import names
 from ...scene.base import parts, saved
-from ...scene.character import build, rig_placement
+from ...scene.character import build, rig_placement, runtime
 from ...scene.file import sample_face
 from ...scene.frame import evaluate
+from ...scene.gaze import gaze_settings
 from .. import words
-from ..beside import RunsBeside
+from ..background_work import RunsBeside
 from ..blender_types import Context, FileHandler, ImportHelper, Menu, Operator, Result
 from ..common import MODES, explain, shown_progress, system_path, usable
 from . import framing
@@ -53,6 +54,7 @@ def import_character(
     except native.user_errors() as error:
         operator.report({"ERROR"}, explain(path, error))
         return {"CANCELLED"}
+    gaze_settings.begin(parts.controls_there(rig), runtime.there(rig))
     if rig_placement.put_beside(context.scene, rig):
         evaluate.bring_up(context, rig)
     if show and not bpy.app.background:

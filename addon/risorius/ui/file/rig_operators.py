@@ -14,7 +14,7 @@ from ...scene.character import build, rig_placement
 from ...scene.file import shape_key_head
 from ...scene.frame import evaluate
 from .. import words
-from ..beside import RunsBeside
+from ..background_work import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
 from ..common import explain, proposed_file, system_path, usable
 from . import framing

@@ -9,7 +9,8 @@ from ...scene.animation import keying, tweaks
 from ...scene.base import parts
 from ...scene.character import board, rig_placement, runtime
 from ...scene.frame import evaluate, joint_turns
-from ...scene.hand import blinks, gaze_target
+from ...scene.gaze import gaze_target
+from ...scene.hand import blinks
 from .. import words
 from ..blender_types import Context, Operator, Panel, Result
 from ..common import FaceOnlyPanel, FaceOperator, face_controls, face_rig

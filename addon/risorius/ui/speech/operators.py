@@ -16,7 +16,7 @@ from ...scene.speech import spoken_keys
 from .. import words
 from ..animation.operators import SOUNDS
 from ..animation.place_clip import PlacesClip
-from ..beside import RunsBeside
+from ..background_work import RunsBeside
 from ..blender_types import Context, ImportHelper, Operator, Result
 from ..common import explain, face_rig, system_path
 from . import install

@@ -193,7 +193,7 @@ def moved_by(control):
     raised[live.labels.index(control)] = 1.0
     poses = [live.rig.evaluate(raw) for raw in (raised, rests)]
     pairs = [(p.joints, p.blend_shapes) for p in poses]
-    far = module("scene.why.displacement").distances(live, int(head()["dna_mesh"]), *pairs)
+    far = module("scene.see_why.displacement").distances(live, int(head()["dna_mesh"]), *pairs)
     vertex = int(np.argmax(far))
     return {"vertex": vertex, "at": on_screen(points()[vertex])}
 
@@ -377,7 +377,7 @@ def has(operator):
 
 def found_causes():
     """What See Why last found of a vertex."""
-    found = module("scene.why.causes").last(rig())
+    found = module("scene.see_why.causes").last(rig())
     return None if found is None else {"vertex": found.vertex, "first": found.causes[0].name}
 
 

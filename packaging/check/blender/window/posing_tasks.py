@@ -228,7 +228,7 @@ def _turn(hand: Hand) -> Iterator[Check]:
     hand.wait("object mode", lambda: hand.ask("state")["mode"] == "OBJECT")
 
 
-TARGET = """getattr(module('scene.hand.gaze_target').holder_of(rig()['risorius_controls']),
+TARGET = """getattr(module('scene.gaze.gaze_target').holder_of(rig()['risorius_controls']),
 'name', '')"""
 EMPTY = """
 made = bpy.data.objects.new("Look Here", None)

@@ -11,7 +11,7 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...scene.frame import evaluate, look_masks
-from ...scene.why import causes, heat
+from ...scene.see_why import causes, heat
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 from ..words import of_error, say

@@ -11,7 +11,7 @@ from bpy_extras import view3d_utils
 
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject, MeshObject
-from ...scene.why import causes
+from ...scene.see_why import causes
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 from ..words import say

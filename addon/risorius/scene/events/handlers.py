@@ -13,9 +13,9 @@ from bpy.app.handlers import persistent
 
 from ... import native
 from ..animation import layer_mixing, layers, tweak_guard
-from ..base import compat, console, parts, session, sharing, written
+from ..base import compat, console, last_written, parts, session, sharing
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
-from ..character import board, lods, outlines, rig_placement, runtime, shown_keys
+from ..character import board, outlines, rig_placement, runtime, shown_keys
 from ..frame import (
     caches,
     channel_preview,
@@ -26,8 +26,9 @@ from ..frame import (
     look_masks,
     timing,
 )
-from ..why import heat
-from . import applied_transforms, bone_edits, duplicates, migrations, repair
+from ..lod import lods
+from ..see_why import heat
+from ..upkeep import applied_transforms, bone_edits, duplicates, migrations, repair
 
 
 @dataclass
@@ -91,7 +92,7 @@ def _render_ended(*_arguments: object) -> None:
         apart = lods.by_distance(rig) or lods.render_level(rig) != lods.viewport_level(rig)
         apart = apart or not look_masks.of(rig).is_whole
         if apart and controls is not None:
-            written.forget()
+            last_written.forget()
             controls.update_tag()
 
 
@@ -193,7 +194,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        written.forget()
+        last_written.forget()
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
@@ -250,7 +251,7 @@ def _loaded(*_arguments: object) -> None:
         repair.heal_all()
         for controls in filter(None, map(parts.controls_of, parts.rigs())):
             shown_keys.show_some(controls)
-        written.forget()
+        last_written.forget()
         look_masks.take_away()  # of a file that Blender saved by itself, before a crash
         heat.end_all()
         refresh()

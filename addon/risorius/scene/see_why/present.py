@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, session, written
+from ..base import last_written, parts, session
 from ..base.blender_types import ArmatureObject
-from ..character import lods, runtime
+from ..character import runtime
 from ..frame import inputs, look_masks
+from ..lod import lods
 
 Factors = dict[int, list[int]]
 # id of a Runtime -> itself, its ControlNames, the factors of its correctives
@@ -58,7 +59,7 @@ def of(rig: ArmatureObject) -> Present | None:
     live, controls = runtime.of(rig), parts.controls_of(rig)
     if live is None or controls is None or parts.BAKED in rig:
         return None
-    state = written.inputs.get(rig.session_uid)
+    state = last_written.inputs.get(rig.session_uid)
     if isinstance(state, tuple):
         raw, lod = np.frombuffer(state[0], np.float32), int(state[1])
     else:  # nothing was evaluated since undo or load

@@ -9,7 +9,7 @@ import bpy
 
 from ..base import parts
 from ..base.blender_types import ArmatureObject, Context
-from ..frame.gaze import CONSTRAINT
+from .gaze import CONSTRAINT
 
 _OWN = "risorius_gaze"  # on an Empty that was made to hold a target
 

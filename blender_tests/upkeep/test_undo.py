@@ -68,7 +68,7 @@ def _duplicate(_chance, rig):
     bpy.ops.object.duplicate()
     bpy.context.view_layer.update()
     for one in _rigs():
-        scene.submodule("scene.character.lods").show(one)
+        scene.submodule("scene.lod.lods").show(one)
 
 
 def _delete(_chance, rig):

@@ -19,7 +19,7 @@ from mathutils import Euler, Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ...logic.base.sentences import Sentence, told
-from ..base import parts, session, written
+from ..base import last_written, parts, session
 from ..base.blender_types import ArmatureObject, MeshObject
 
 _NEAR = 1e-5  # of the largest number: what multiplying in float32 leaves
@@ -151,7 +151,7 @@ def _read(items: bpy.types.bpy_prop_collection, name: str) -> NDArray[np.float32
 
 def _followed(rig: ArmatureObject) -> dict[bpy.types.Object, Matrix]:
     """Where rig and controls stood when the rig last followed: frames make no update."""
-    controls, kept = parts.controls_of(rig), written.places.get(rig.session_uid)
+    controls, kept = parts.controls_of(rig), last_written.places.get(rig.session_uid)
     if not isinstance(kept, bytes) or parts.BAKED in rig:
         return {}
     place = Matrix(np.frombuffer(kept).reshape(4, 4).tolist())

@@ -8,7 +8,7 @@ from typing import cast
 
 import bpy
 
-from ..base import compat, parts, written
+from ..base import compat, last_written, parts
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import armatures, meshes
 from ..material import materials
@@ -86,7 +86,7 @@ def _own_key_drivers(item: MeshObject, rig: ArmatureObject) -> None:
     names = meshes.real_channels(item)
     paths = {f'key_blocks["{bpy.utils.escape_identifier(n)}"].value' for n in names}
     if _retarget([c for c in key.animation_data.drivers if c.data_path in paths], rig):
-        written.forget()
+        last_written.forget()
 
 
 def retarget_materials(item: MeshObject, rig: ArmatureObject) -> None:

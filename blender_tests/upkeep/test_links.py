@@ -77,7 +77,7 @@ def _plays(rig, dna_file):
 
 def _said():
     layout = Recorder()
-    scene.submodule("ui.life.panel").draw_trouble(layout, bpy.context)
+    scene.submodule("ui.upkeep.panel").draw_trouble(layout, bpy.context)
     return layout.text()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...language import tables
 from ..base.blender_types import ArmatureObject
-from . import runtime
+from ..character import runtime
 
 _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 

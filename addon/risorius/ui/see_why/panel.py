@@ -7,7 +7,7 @@ from ...scene.animation import layers
 from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject, current_context
 from ...scene.frame import joint_readings, look_masks
-from ...scene.why import causes, heat, present
+from ...scene.see_why import causes, heat, present
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, face_controls, face_rig
@@ -16,7 +16,7 @@ from .spoken import spoken, title
 
 _ROWS = 10  # of a list
 # Whether the strongest correctives are asked for, a moment after a change.
-_soon = session.value("why.panel.soon", False, ("load",))
+_soon = session.value("see_why.panel.soon", False, ("load",))
 
 
 class RISORIUS_PT_why(FaceOnlyPanel, Panel):

@@ -10,7 +10,7 @@ from ...logic.base.errors import FaceError
 from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import evaluate
-from ...scene.life import library_overrides, repair
+from ...scene.upkeep import library_overrides, repair
 from ..blender_types import Context, Operator, Result
 from ..common import usable
 from ..words import of_error, say

@@ -2,7 +2,7 @@
 """Words and buttons of the panel Face for what keeps a face from moving."""
 
 from ...scene.base import parts
-from ...scene.life import applied_transforms, library_overrides, migrations, repair
+from ...scene.upkeep import applied_transforms, library_overrides, migrations, repair
 from .. import words
 from ..blender_types import Context, UILayout
 from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, override_trouble

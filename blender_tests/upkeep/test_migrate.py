@@ -14,7 +14,7 @@ VERSION = "risorius_version"
 
 def _said():
     layout = Recorder()
-    scene.submodule("ui.life.panel").draw_trouble(layout, bpy.context)
+    scene.submodule("ui.upkeep.panel").draw_trouble(layout, bpy.context)
     return layout.text()
 
 
@@ -107,7 +107,7 @@ def test_a_form_that_is_no_number_counts_as_none(rubbish):
     del past.controls()[0][VERSION]
     past.controls()[0][VERSION] = rubbish
     assert scene.submodule("scene.base.form").version_of(past.controls()[0]) == 0
-    scene.submodule("scene.life.migrations").bring_up_all()
+    scene.submodule("scene.upkeep.migrations").bring_up_all()
     assert past.controls()[0][VERSION] == 3
 
 

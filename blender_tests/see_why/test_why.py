@@ -23,7 +23,7 @@ def rig(dna_file):
 
 
 def why(name):
-    return scene.submodule(f"scene.why.{name}")
+    return scene.submodule(f"scene.see_why.{name}")
 
 
 def raw_with(rig, path, **values):
@@ -139,7 +139,7 @@ def test_a_rendered_frame_is_whole_and_the_view_is_solo_again(rig, dna_file, tmp
     bpy.context.view_layer.update()
     raw = scene.raw_of(rig, dna_file)
     assert scene.error_against_oracle(rig, dna_file, raw) < scene.TOLERANCE
-    scene.submodule("scene.life.handlers")._render_ended()
+    scene.submodule("scene.events.handlers")._render_ended()
     bpy.context.view_layer.update()
     alone = raw_with(rig, dna_file, mouthCornerPullL=0.0)
     assert scene.error_against_oracle(rig, dna_file, alone) < scene.TOLERANCE
@@ -306,7 +306,7 @@ def test_a_control_and_its_correctives(rig):
     assert [(n, pytest.approx(v)) for n, v in part.others] == [("mouthCornerPullL", 0.4)]
     assert causes.parts_of(rig, 3) == []
     bpy.context.window_manager.risorius_why.control = JAW
-    spoken = scene.submodule("ui.why.spoken").spoken
+    spoken = scene.submodule("ui.see_why.spoken").spoken
     assert spoken(bpy.context, "jawOpen x mouthCornerPullL") == "Jaw Open x Mouth Corner Pull R"
     text = drawn(bpy.types.RISORIUS_PT_why).text()
     assert spoken(bpy.context, part.name) in text

@@ -177,7 +177,7 @@ def test_a_copy_of_the_controls_alone_says_that_it_moves_nothing(rig, dna_file):
 
 
 def _writer(rig):
-    return scene.submodule("scene.base.written").bone_writers[rig.session_uid]
+    return scene.submodule("scene.base.last_written").bone_writers[rig.session_uid]
 
 
 def test_a_step_of_a_slider_is_no_edit_of_the_bones(rig, dna_file):

@@ -14,7 +14,7 @@ import bpy
 
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
-from ..base import compat, parts, written
+from ..base import compat, last_written, parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import meshes
 from ..frame import evaluate
@@ -112,7 +112,7 @@ def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
         if live and not local_meshes:
             done.append(f"{item.name} has a live key: its mesh was copied into this file.")
     duplicates.separate(rig)
-    written.forget()
+    last_written.forget()
     return done
 
 

@@ -11,20 +11,22 @@ import bpy
 from . import session
 
 # Deforming armature -> what its face was last evaluated from.
-inputs: dict[int, object] = session.table("written.inputs", ("rewrite", "undo", "load"))
+inputs: dict[int, object] = session.table("last_written.inputs", ("rewrite", "undo", "load"))
 # Deforming armature -> bytes of the matrix that was last written.
-places: dict[int, object] = session.table("written.places", ("rewrite", "undo", "load"))
+places: dict[int, object] = session.table("last_written.places", ("rewrite", "undo", "load"))
 # Shape key -> bytes of the channel weights of its sum.
-weights: dict[int, object] = session.table("written.weights", ("rewrite", "undo", "load"))
+weights: dict[int, object] = session.table("last_written.weights", ("rewrite", "undo", "load"))
 # Deforming armature -> the Writer of frame/bone_writer.py, until its bones change.
-bone_writers: dict[int, object] = session.table("written.bone_writers", ("rewrite", "undo", "load"))
+bone_writers: dict[int, object] = session.table(
+    "last_written.bone_writers", ("rewrite", "undo", "load")
+)
 # Deforming armature -> the Reading of frame/joint_readings.py, until the file is edited. Undo
 # keeps it: it knows what the console was told.
-readings: dict[int, object] = session.table("written.readings", ("load",))
+readings: dict[int, object] = session.table("last_written.readings", ("load",))
 # Shape keys whose points were last written without an update.
-unheard: set[int] = session.keep("written.unheard", set, ("rewrite", "undo", "load"))
+unheard: set[int] = session.keep("last_written.unheard", set, ("rewrite", "undo", "load"))
 # Objects of overrides that Blender lets nobody write to.
-_refused: set[int] = session.keep("written.refused", set, ("rewrite", "undo", "load"))
+_refused: set[int] = session.keep("last_written.refused", set, ("rewrite", "undo", "load"))
 
 
 def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:

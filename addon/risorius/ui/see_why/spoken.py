@@ -5,7 +5,7 @@ from functools import partial
 
 from ...logic.character import slider_words
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.why import heat
+from ...scene.see_why import heat
 from ..blender_types import Context
 from ..common import as_seen
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ...logic.base.space import world_matrices
 from ..base import parts, session
 from ..base.blender_types import ArmatureObject
-from ..character import lods, meshes, runtime
+from ..character import meshes, runtime
+from ..lod import lods
 
 Doubles = NDArray[np.float64]
 _skins: dict[tuple[int, int], tuple[runtime.Runtime, Skin]] = session.table(

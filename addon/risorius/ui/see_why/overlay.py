@@ -15,7 +15,7 @@ from ...logic.base import heat_ramp
 from ...scene.base import parts, session
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import look_masks
-from ...scene.why import causes, heat, present
+from ...scene.see_why import causes, heat, present
 from .. import words
 from ..blender_types import Context
 from .properties import choices
