@@ -93,7 +93,7 @@ MISSED = (
     "heat.held",
     "present.known",
     "tool.pointed",
-    "why.panel.soon",
+    "see_why.panel.soon",
 )
 
 
@@ -106,7 +106,7 @@ def test_a_load_leaves_nothing_of_the_file_before(dna_file):
     rig = _fill(dna_file)
     live = weakref.ref(scene.submodule("scene.character.runtime").of(rig))
     full = _held(session, "load")
-    kept = {"present.known", "displacement.skins", "why.panel.soon", "caches.late"}
+    kept = {"present.known", "displacement.skins", "see_why.panel.soon", "caches.late"}
     assert kept | {"last_written.inputs", "heat.shown"} <= full
     assert [name for name in MISSED if "load" not in session.ends_of(name)] == []
     _load()

@@ -48,7 +48,7 @@ def _done(mode):
 
 def _heights():
     panels = ("face.panel.RISORIUS_PT_character", "face.controls_panel.RISORIUS_PT_controls")
-    panels += ("hand.panel.RISORIUS_PT_hand", "why.panel.RISORIUS_PT_why")
+    panels += ("hand.panel.RISORIUS_PT_hand", "see_why.panel.RISORIUS_PT_why")
     found = []
     for place in panels:
         module, _, name = place.rpartition(".")
