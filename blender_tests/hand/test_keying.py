@@ -152,7 +152,7 @@ OTHERS = {
     "the range of sliders: keys are cut as well": "set_overdrive",
     "drivers; each side shows what it showed": "link_sides",
     "what is shown, and why": "frame_board frame_face heat hide_hints hide_outlines mask_renders "
-    "mute set_strands show_all solo why_vertex",
+    "move_outlines mute set_strands show_all solo why_vertex",
     "reads the controls": "copy_pose make_pose_assets save_expression update_expression "
     "render_thumbnails",
     "files of expressions": "rename_expression delete_expression star_expression "

@@ -244,9 +244,12 @@ def _compile(
 
 
 def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> native.Mixer:
+    ranges = {n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)}
+    # The gaze target stands anywhere; turns have no limits by their names.
+    ranges |= dict.fromkeys(clip_logic.TARGET, (-np.inf, np.inf))
     return native.module().Mixer(
         [*live.labels, *clip_logic.BONES],
-        ranges={n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)},
+        ranges=ranges,
         exclusives="default" if controls.risorius_layer_rules else None,
         max_fired=_MOST_FIRED,
     )
