@@ -55,6 +55,7 @@ step "extensions and their repository"
 rm -rf "$out" && mkdir -p "$out"
 cp "${wheels[@]}" "${people[@]}" "${sdist[@]}" "$out"
 for person in ${RISORIUS_PEOPLE:-}; do
+  mkdir "$out/$person"
   "$venv/bin/risorius" sample build "$out/$person/$person.dna" --person "$person"
   (cd "$out" && "$python" -m zipfile -c "risorius-$person-$version.zip" "$person" && rm -r "$person")
 done
