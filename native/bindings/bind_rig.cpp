@@ -374,17 +374,21 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
   return out;
 }
 
-void bind_rig_class(py::module_& m) {
-  py::class_<rig::Rig, std::shared_ptr<rig::Rig>>(
-      m, "Rig", "A compiled face: turns raw controls into a Pose. Immutable, shared freely.")
-      .def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
-           py::arg("rotation") = "euler", py::arg("simd") = py::none())
-      .def_static(
-          "from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
-          py::arg("simd") = py::none(),
-          "A Rig from what to_bytes or block gave, of this version and byte order. A "
-          "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
-          "other buffer is copied. trusted leaves out the hash and the check of every index.")
+using RigClass = py::class_<rig::Rig, std::shared_ptr<rig::Rig>>;
+
+py::list texts(const auto& list) {
+  py::list out;
+  for (const auto& text : list) out.append(to_python(text));
+  return out;
+}
+
+// A Rig as bytes and as a file, there and back.
+void bind_rig_bytes(RigClass& c) {
+  c.def_static("from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
+               py::arg("simd") = py::none(),
+               "A Rig from what to_bytes or block gave, of this version and byte order. A "
+               "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
+               "other buffer is copied. trusted leaves out the hash and the check of every index.")
       .def(
           "to_bytes",
           [](const rig::Rig& r) {
@@ -404,30 +408,22 @@ void bind_rig_class(py::module_& m) {
                   "flipped bit may then end the process. mapped uses the pages of a trusted file "
                   "in place: they may only be replaced as a whole file and not be written to or "
                   "cut while the Rig lives. Raises DnaError.")
-      .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.")
-      .def_property_readonly("raw_control_names",
-                             [](const rig::Rig& r) {
-                               py::list out;
-                               for (const auto& n : r.raw_control_names()) out.append(to_python(n));
-                               return out;
-                             })
+      .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.");
+}
+
+// The names, counts and joints of a Rig.
+void bind_rig_contents(RigClass& c) {
+  c.def_property_readonly("raw_control_names",
+                          [](const rig::Rig& r) { return texts(r.raw_control_names()); })
       .def_property_readonly("gui_control_names",
-                             [](const rig::Rig& r) {
-                               py::list out;
-                               for (const auto& n : r.gui_control_names()) out.append(to_python(n));
-                               return out;
-                             })
+                             [](const rig::Rig& r) { return texts(r.gui_control_names()); })
       .def_readonly("joint_count", &rig::Rig::joint_count)
       .def_readonly("blend_shape_count", &rig::Rig::blend_shape_count)
       .def_readonly("animated_map_count", &rig::Rig::animated_map_count)
       .def_readonly("lod_count", &rig::Rig::lod_count)
       .def_readonly("control_count", &rig::Rig::control_count)
       .def_property_readonly("ignored_layers",
-                             [](const rig::Rig& r) {
-                               py::list out;
-                               for (const auto& id : r.ignored_layers()) out.append(to_python(id));
-                               return out;
-                             })
+                             [](const rig::Rig& r) { return texts(r.ignored_layers()); })
       .def_property_readonly("memory_bytes", &rig::Rig::memory_bytes)
       .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
       .def_property_readonly("neutral_joints",
@@ -447,21 +443,22 @@ void bind_rig_class(py::module_& m) {
                           {static_cast<py::ssize_t>(r.raw_count)});
           },
           "float32[R]: 0, but 1 for the w of each rotation that solvers and setups read.")
-      .def_property_readonly("joint_indices_written",
-                             [](const rig::Rig& r) {
-                               return py::array_t<std::uint16_t>(
-                                   static_cast<py::ssize_t>(r.joints_written.size()),
-                                   r.joints_written.data());
-                             })
-      .def(
-          "gui_to_raw",
-          [](const rig::Rig& r, const py::object& gui) {
-            const FloatArray in = vector_argument(gui, "gui", r.gui_count);
-            py::array_t<float> raw(static_cast<py::ssize_t>(r.raw_count));
-            rig::gui_to_raw(r, in.data(), raw.mutable_data());
-            return raw;
-          },
-          py::arg("gui"), "float32[G] -> float32[R] in [0, 1]")
+      .def_property_readonly("joint_indices_written", [](const rig::Rig& r) {
+        return py::array_t<std::uint16_t>(static_cast<py::ssize_t>(r.joints_written.size()),
+                                          r.joints_written.data());
+      });
+}
+
+void bind_rig_evaluation(RigClass& c) {
+  c.def(
+       "gui_to_raw",
+       [](const rig::Rig& r, const py::object& gui) {
+         const FloatArray in = vector_argument(gui, "gui", r.gui_count);
+         py::array_t<float> raw(static_cast<py::ssize_t>(r.raw_count));
+         rig::gui_to_raw(r, in.data(), raw.mutable_data());
+         return raw;
+       },
+       py::arg("gui"), "float32[G] -> float32[R] in [0, 1]")
       .def(
           "raw_to_gui",
           [](const rig::Rig& r, const py::object& raw) {
@@ -488,6 +485,16 @@ void bind_rig_class(py::module_& m) {
            "radians where they are angles; float32[poses] weights, 0 below the threshold).")
       .def("instance",
            [](const std::shared_ptr<rig::Rig>& r) { return PyInstance{r, rig::Instance(*r)}; });
+}
+
+void bind_rig_class(py::module_& m) {
+  RigClass c(m, "Rig",
+             "A compiled face: turns raw controls into a Pose. Immutable, shared freely.");
+  c.def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
+        py::arg("rotation") = "euler", py::arg("simd") = py::none());
+  bind_rig_bytes(c);
+  bind_rig_contents(c);
+  bind_rig_evaluation(c);
 }
 
 void bind_morph(py::module_& m) {

@@ -16,6 +16,7 @@ namespace risorius::author {
 
 namespace {
 
+using core::ErrorCode;
 using detail::Influence;
 using detail::Joint;
 using detail::Mat3;
@@ -327,18 +328,8 @@ Fit pack(const Problem& problem, const State& state, std::size_t expressions) {
   return out;
 }
 
-core::Status check(const Shapes& shapes, const FitOptions& options) {
-  using core::ErrorCode;
-  const std::size_t n = shapes.vertex_count(), values = n * shapes.expressions * 3;
-  if (n == 0 || shapes.expressions == 0) {
-    return core::fail(ErrorCode::kInvalidArgument, "shapes",
-                      "a mesh and at least one expression were expected");
-  }
-  if (shapes.displacements.size() != values) {
-    return core::fail(ErrorCode::kInvalidArgument, "displacements",
-                      std::to_string(values) + " numbers were expected, found " +
-                          std::to_string(shapes.displacements.size()));
-  }
+core::Status check_mesh(const Shapes& shapes) {
+  const std::size_t n = shapes.vertex_count();
   for (const Edge& e : shapes.edges) {
     if (e[0] < n && e[1] < n) continue;
     return core::fail(
@@ -363,8 +354,12 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
     return core::fail(ErrorCode::kInvalidValue, "importance[" + std::to_string(v) + "]",
                       "a finite number above 0 was expected");
   }
+  return core::ok();
+}
+
+core::Status check_displacements(const Shapes& shapes) {
   double most = 0.0;
-  for (std::size_t i = 0; i < values; ++i) {
+  for (std::size_t i = 0; i < shapes.displacements.size(); ++i) {
     const float d = shapes.displacements[i];
     if (!core::is_finite(d)) {
       return core::fail(ErrorCode::kInvalidValue,
@@ -376,34 +371,45 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
   }
   if (most <= 0.0)
     return core::fail(ErrorCode::kInvalidValue, "displacements", "no expression moves a vertex");
-  for (std::size_t j = 0; j < options.given.size(); ++j) {
-    const std::uint32_t other = options.given[j].mirrored;
+  return core::ok();
+}
+
+core::Status check_given(const std::vector<GivenJoint>& given, std::size_t expressions) {
+  for (std::size_t j = 0; j < given.size(); ++j) {
+    const std::uint32_t other = given[j].mirrored;
     if (other == GivenJoint::kUnknown) continue;
-    if (other < options.given.size() && options.given[other].mirrored == j) continue;
+    if (other < given.size() && given[other].mirrored == j) continue;
     return core::fail(ErrorCode::kInvalidIndex, "given[" + std::to_string(j) + "]",
                       "a joint of the other side was expected whose other side it is");
   }
-  for (const GivenJoint& g : options.given) {
-    if (g.motions.empty() || g.motions.size() == shapes.expressions) continue;
+  for (const GivenJoint& g : given) {
+    if (g.motions.empty() || g.motions.size() == expressions) continue;
     return core::fail(ErrorCode::kInvalidLength, "given",
-                      "motions of " + std::to_string(shapes.expressions) +
+                      "motions of " + std::to_string(expressions) +
                           " expressions or none were expected, found " +
                           std::to_string(g.motions.size()));
   }
-  for (std::size_t i = 0; i < options.pivots.size(); ++i) {
-    const Pivot& pivot = options.pivots[i];
+  return core::ok();
+}
+
+core::Status check_pivots(const std::vector<Pivot>& pivots, std::size_t expressions) {
+  for (std::size_t i = 0; i < pivots.size(); ++i) {
+    const Pivot& pivot = pivots[i];
     const std::string place = "pivots[" + std::to_string(i) + "]";
     for (const double x : pivot.position) {
       if (!std::isfinite(x))
         return core::fail(ErrorCode::kInvalidValue, place, "a finite number was expected");
     }
     for (const std::uint32_t e : pivot.expressions) {
-      if (e < shapes.expressions) continue;
-      return core::fail(
-          ErrorCode::kInvalidIndex, place,
-          "expression " + std::to_string(e) + " of " + std::to_string(shapes.expressions));
+      if (e < expressions) continue;
+      return core::fail(ErrorCode::kInvalidIndex, place,
+                        "expression " + std::to_string(e) + " of " + std::to_string(expressions));
     }
   }
+  return core::ok();
+}
+
+core::Status check_numbers(const FitOptions& options) {
   const std::size_t needed = options.given.size() + 2;
   if (options.joints < needed || options.joints > 4096) {
     return core::fail(
@@ -427,9 +433,27 @@ core::Status check(const Shapes& shapes, const FitOptions& options) {
   return core::ok();
 }
 
+core::Status check(const Shapes& shapes, const FitOptions& options) {
+  const std::size_t n = shapes.vertex_count(), values = n * shapes.expressions * 3;
+  if (n == 0 || shapes.expressions == 0) {
+    return core::fail(ErrorCode::kInvalidArgument, "shapes",
+                      "a mesh and at least one expression were expected");
+  }
+  if (shapes.displacements.size() != values) {
+    return core::fail(ErrorCode::kInvalidArgument, "displacements",
+                      std::to_string(values) + " numbers were expected, found " +
+                          std::to_string(shapes.displacements.size()));
+  }
+  RISORIUS_TRY(check_mesh(shapes));
+  RISORIUS_TRY(check_displacements(shapes));
+  RISORIUS_TRY(check_given(options.given, shapes.expressions));
+  RISORIUS_TRY(check_pivots(options.pivots, shapes.expressions));
+  RISORIUS_TRY(check_numbers(options));
+  return core::ok();
+}
+
 /// Takes the weights to begin with. Fails: see fit_weights
 core::Status take_start(const StartWeights& start, State& state) {
-  using core::ErrorCode;
   if (start.influences == 0) return core::ok();
   const std::size_t size = state.weights.size() * start.influences;
   if (start.joints.size() != size || start.weights.size() != size) {
@@ -519,7 +543,6 @@ void thin_out(const Problem& problem, double least_effect, State& state, std::ve
 /// New joints that rest, each in the middle of what it moves or at its pivot.
 core::Status take_new_joints(const Problem& problem, const StartWeights& weights,
                              const std::vector<std::uint32_t>& at, State& state) {
-  using core::ErrorCode;
   const std::size_t given = state.joints.size();
   for (std::size_t j = 0; j < at.size(); ++j) {
     if (at[j] == kInTheMiddle || at[j] < problem.pivots.size()) continue;
@@ -555,7 +578,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
   detail::find_residual(problem, state, left);
   const std::vector<std::size_t> counts = stages(options.joints);
   Steps steps(progress, 2 * counts.size() + options.rounds + 1);
-  const auto stopped = [] { return core::fail(core::ErrorCode::kInvalidArgument, "", "stopped"); };
+  const auto stopped = [] { return core::fail(ErrorCode::kInvalidArgument, "", "stopped"); };
   for (const std::size_t count : counts) {
     detail::add_joints(problem, state, left, std::max(count, state.joints.size()));
     for (int repeat = 0; repeat < 2; ++repeat) {
@@ -593,7 +616,7 @@ core::Result<Fit> fit_motions(const Shapes& shapes, const FitOptions& options,
   take_pivots(own.pivots, problem);
   State state = start(problem, own.given, shapes.expressions);
   if (state.joints.size() + at.size() != own.joints || own.given.size() != state.joints.size()) {
-    return core::fail(core::ErrorCode::kInvalidArgument, "given",
+    return core::fail(ErrorCode::kInvalidArgument, "given",
                       "a joint that rests and " + std::to_string(own.joints) +
                           " joints in all were expected, found " +
                           std::to_string(own.given.size() + at.size()));
