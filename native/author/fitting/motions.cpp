@@ -6,7 +6,6 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <cmath>
 
 #include "author/fitting/problem.h"
 #include "author/fitting/weights_by_joint.h"
