@@ -164,26 +164,34 @@ def solve_clip(
     wanted = _meshes("frames", surface, frames, 3)
     surface.check_size(min(most_points, sum(surface.vertex_counts[m] for m in wanted)))
     count = _frame_count(wanted)
-    checked("rate", finite, rate, 0.01, 1e6)
-    checked("start", finite, start, -1e9, 1e9)
-    for name, price in (("sparse", sparse), ("smooth", smooth)):
-        checked(name, finite, price, 0.0, 1e9)
+    _check_numbers(rate, start, sparse, smooth)
     checked("most_points", whole, most_points, 1, MOST)
     checked("threads", whole, threads, 0, 1024)
     moved = _moved(surface, wanted, neutral)
     rest = surface.rig.initial_raw_controls.astype(np.float64)
     bounds = limits.around(rest, _usual(surface))
     points = _points(surface, wanted, bounds, most_points)
-    targets = np.concatenate(
-        [moved[m][:, points[points[:, 0] == m, 1]] for m in sorted(wanted)], axis=1
-    )
+    targets = _targets(moved, points)
     noise = _noise(targets)
+    sigma, share = float(np.hypot(noise, _FLOOR_MM / surface.mm)), 1 / (3 * count)
     job = _Job(
-        surface, points, targets, *bounds, rest, sparse, smooth, rate,
-        float(np.hypot(noise, _FLOOR_MM / surface.mm)), progress, 1 / (3 * count),
-    )  # fmt: skip
-    curves = _curves(job, count, threads or os.cpu_count() or 1)
-    return _result(job, curves, moved, rate, start, noise)
+        surface, points, targets, *bounds, rest, sparse, smooth, rate, sigma, progress, share
+    )
+    return _result(job, _curves(job, count, threads or os.cpu_count() or 1), moved, start, noise)
+
+
+def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> None:
+    checked("rate", finite, rate, 0.01, 1e6)
+    checked("start", finite, start, -1e9, 1e9)
+    for name, price in (("sparse", sparse), ("smooth", smooth)):
+        checked(name, finite, price, 0.0, 1e9)
+
+
+def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
+    """float32[F, P, 3]: where points int64[P, 2] are wanted."""
+    return np.concatenate(
+        [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
+    )
 
 
 def _curves(job: _Job, count: int, workers: int) -> Doubles:
@@ -340,7 +348,7 @@ def _smoothed(
 
 
 def _result(
-    job: _Job, curves: Doubles, moved: dict[int, Floats], rate: float, start: float, noise: float
+    job: _Job, curves: Doubles, moved: dict[int, Floats], start: float, noise: float
 ) -> SolvedClip:
     surface = job.surface
     frame_sum, largest, total = np.zeros(len(curves)), 0.0, 0
@@ -360,7 +368,7 @@ def _result(
         total += count
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > _ENOUGH)
     names = surface.rig.raw_control_names
-    clip = Clip([names[i] for i in used], curves.T[used], rate, start=start)
+    clip = Clip([names[i] for i in used], curves.T[used], job.rate, start=start)
     frame = np.sqrt(frame_sum / max(1, total)).astype(np.float32)
     return SolvedClip(clip, frame, by_vertex, float(np.sqrt(largest)), noise)
 
