@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
     from risorius import (  # noqa: F401  # noqa: F401
         BoneSpace,
         Clip,
+        ControlLimits,
         Dna,
         Layer,
         Mesh,

@@ -13,7 +13,6 @@ namespace risorius::bindings {
 
 namespace {
 
-using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using PlainEvent = std::tuple<double, py::object, double, py::object>;
 using Pairs = std::vector<std::pair<py::object, py::object>>;

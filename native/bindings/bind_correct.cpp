@@ -56,9 +56,7 @@ SkinFaults faults(const Floats& depth, const Floats& stretch, const Floats& fold
   return {list(depth), list(stretch), list(fold)};
 }
 
-}  // namespace
-
-void bind_correct(py::module_& m) {
+void bind_faults(py::module_& m) {
   py::class_<FaultSums>(m, "FaultSums", "What is worse than allowed, in one number of each kind.")
       .def_readonly("volume", &FaultSums::volume, "mm3: depth times area.")
       .def_readonly("deepest", &FaultSums::deepest, "mm beyond what is allowed.")
@@ -76,18 +74,21 @@ void bind_correct(py::module_& m) {
       .def_property_readonly(
           "fold", [](const SkinFaults& f) { return array(f.fold); },
           "float32[inner edges], cosine between the normals of both faces.");
-  py::class_<SkinChecker>(m, "SkinChecker", "See risorius.author.correctives.")
-      .def(py::init(&make), py::arg("neutral"), py::arg("face_offsets"), py::arg("corners"),
-           py::arg("solids"), py::arg("mm"))
-      .def_property_readonly(
-          "shown",
-          [](const SkinChecker& checker) {
-            const std::vector<bool>& shown = checker.shown();
-            py::array_t<bool> out(static_cast<py::ssize_t>(shown.size()));
-            std::ranges::copy(shown, out.mutable_data());
-            return out;
-          },
-          "bool[V]: what somebody may see; nothing else is asked to stay outside.")
+}
+
+using CheckerClass = py::class_<SkinChecker>;
+
+// The methods that read a skin and change nothing.
+void bind_looks(CheckerClass& c) {
+  c.def_property_readonly(
+       "shown",
+       [](const SkinChecker& checker) {
+         const std::vector<bool>& shown = checker.shown();
+         py::array_t<bool> out(static_cast<py::ssize_t>(shown.size()));
+         std::ranges::copy(shown, out.mutable_data());
+         return out;
+       },
+       "bool[V]: what somebody may see; nothing else is asked to stay outside.")
       .def(
           "nearest",
           [](const SkinChecker& checker, const Doubles& points, const Doubles& normals) {
@@ -123,26 +124,39 @@ void bind_correct(py::module_& m) {
           [](const SkinChecker& checker, const SkinFaults& found, const SkinFaults& allowed) {
             return unwrap(checker.sum(found, allowed));
           },
-          py::arg("faults"), py::arg("allowed"), "FaultSums.")
-      .def(
-          "repair",
-          [](const SkinChecker& checker, const Doubles& skin, const std::vector<Doubles>& solids,
-             const SkinFaults& allowed, const std::vector<Doubles>& without) {
-            const author::SkinPose here = pose(skin, solids);
-            const author::SkinPose others = pose(skin, without);
-            auto result = [&] {
-              const py::gil_scoped_release released;
-              return checker.repair(here, allowed, others.solids);
-            }();
-            const author::Repair out = unwrap(std::move(result));
-            Doubles moved({static_cast<py::ssize_t>(out.displacement.size()), py::ssize_t{3}});
-            double* to = moved.mutable_data();
-            for (const author::Vector3& x : out.displacement)
-              to = std::copy(x.begin(), x.end(), to);
-            return py::make_tuple(moved, out.before, out.after);
-          },
-          py::arg("skin"), py::arg("solids"), py::arg("allowed"), py::arg("without"),
-          "float64[V, 3] to be added, FaultSums before and after.");
+          py::arg("faults"), py::arg("allowed"), "FaultSums.");
+}
+
+void bind_repair(CheckerClass& c) {
+  c.def(
+      "repair",
+      [](const SkinChecker& checker, const Doubles& skin, const std::vector<Doubles>& solids,
+         const SkinFaults& allowed, const std::vector<Doubles>& without) {
+        const author::SkinPose here = pose(skin, solids);
+        const author::SkinPose others = pose(skin, without);
+        auto result = [&] {
+          const py::gil_scoped_release released;
+          return checker.repair(here, allowed, others.solids);
+        }();
+        const author::Repair out = unwrap(std::move(result));
+        Doubles moved({static_cast<py::ssize_t>(out.displacement.size()), py::ssize_t{3}});
+        double* to = moved.mutable_data();
+        for (const author::Vector3& x : out.displacement) to = std::copy(x.begin(), x.end(), to);
+        return py::make_tuple(moved, out.before, out.after);
+      },
+      py::arg("skin"), py::arg("solids"), py::arg("allowed"), py::arg("without"),
+      "float64[V, 3] to be added, FaultSums before and after.");
+}
+
+}  // namespace
+
+void bind_correct(py::module_& m) {
+  bind_faults(m);
+  CheckerClass c(m, "SkinChecker", "See risorius.author.correctives.");
+  c.def(py::init(&make), py::arg("neutral"), py::arg("face_offsets"), py::arg("corners"),
+        py::arg("solids"), py::arg("mm"));
+  bind_looks(c);
+  bind_repair(c);
 }
 
 }  // namespace risorius::bindings

@@ -44,7 +44,9 @@ void bind_structs(py::module_& m) {
   numbers(psds, "rows", [](auto& s) -> auto& { return s.rows; });
   numbers(psds, "columns", [](auto& s) -> auto& { return s.columns; });
   numbers(psds, "values", [](auto& s) -> auto& { return s.values; });
+}
 
+void bind_behavior_structs(py::module_& m) {
   auto group = value_class<dna::JointGroup>(
       m, "JointGroup", "A dense matrix from controls (columns) to joint attributes (rows).");
   numbers(group, "lods", [](auto& s) -> auto& { return s.lods; });
@@ -227,6 +229,7 @@ void bind_behavior_and_geometry(DnaClass& c) {
 
 void bind_dna(py::module_& m) {
   bind_structs(m);
+  bind_behavior_structs(m);
   bind_meshes(m);
   bind_dna_extensions(m);
   DnaClass c = value_class<Dna>(m, "Dna", "A whole DNA file as a value; see risorius.load.");

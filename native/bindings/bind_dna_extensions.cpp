@@ -22,7 +22,9 @@ void bind_networks(py::module_& m) {
   numbers(network, "output_indices", [](auto& s) -> auto& { return s.output_indices; });
   numbers(network, "input_indices", [](auto& s) -> auto& { return s.input_indices; });
   parts(network, "layers", [](auto& s) -> auto& { return s.layers; });
+}
 
+void bind_networks_behavior(py::module_& m) {
   using Behavior = dna::MachineLearnedBehavior;
   auto ml = value_class<Behavior>(m, "MachineLearnedBehavior", "Layer mlbh.");
   texts(ml, "ml_control_names", [](auto& s) -> auto& { return s.ml_control_names; });
@@ -122,7 +124,9 @@ void bind_operations(py::module_& m) {
         }
         s.operations = std::move(out);
       });
+}
 
+void bind_ml_joints(py::module_& m) {
   auto joints = value_class<dna::MlJoints>(
       m, "MlJoints", "Joints that networks move: outputs are joint * 9 (or 10) + attribute.");
   numbers(joints, "parameter_keys", [](auto& s) -> auto& { return s.parameter_keys; });
@@ -226,7 +230,9 @@ void bind_joints(py::module_& m) {
 
 void bind_dna_extensions(py::module_& m) {
   bind_networks(m);
+  bind_networks_behavior(m);
   bind_operations(m);
+  bind_ml_joints(m);
   bind_rbf(m);
   bind_joints(m);
 }

@@ -6,7 +6,6 @@ namespace risorius::bindings {
 
 namespace {
 
-using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 using CurvesPtr = std::shared_ptr<const clip::LayerCurves>;

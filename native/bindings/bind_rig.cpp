@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <functional>
 #include <list>
-#include <set>
 
 #include "bindings/numpy_arrays.h"
 #include "compile/compile.h"
-#include "core/finite.h"
 #include "core/parallel_for.h"
 #include "dna/validate.h"
 #include "rig/block.h"
 #include "rig/finite_controls.h"
-#include "rig/outputs/bone_space.h"
-#include "rig/outputs/morph.h"
 #include "rig/rig_file.h"
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
@@ -23,7 +18,6 @@ namespace risorius::bindings {
 
 namespace {
 
-using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using RigPtr = std::shared_ptr<const rig::Rig>;
 
 struct PoseArrays {
@@ -35,20 +29,6 @@ struct PyInstance {
   rig::Instance instance;
 };
 
-FloatArray vector_argument(const py::object& object, const char* name, std::size_t length) {
-  FloatArray array = FloatArray::ensure(object);
-  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
-  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != length) {
-    shape_error(name, "(" + std::to_string(length) + ",)", array);
-  }
-  return array;
-}
-
-void require_finite(const FloatArray& array, const char* name) {
-  if (core::all_finite({array.data(), static_cast<std::size_t>(array.size())})) return;
-  throw py::value_error(std::string(name) + ": finite numbers were expected");
-}
-
 py::list quaternion_column_orders(const dna::Dna& dna) {
   std::vector<dna::Warning> warnings;
   unwrap(dna::validate(dna, warnings));
@@ -59,102 +39,6 @@ py::list quaternion_column_orders(const dna::Dna& dna) {
     out.append(py::array_t<std::uint32_t>(static_cast<py::ssize_t>(order.size()), order.data()));
   }
   return out;
-}
-
-FloatArray matrix_argument(const py::object& object, const char* name, py::ssize_t rows) {
-  FloatArray array = FloatArray::ensure(object);
-  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
-  if (array.ndim() != 2 || array.shape(0) != rows || array.shape(1) != 3) {
-    shape_error(name, "(" + std::to_string(rows) + ", 3)", array);
-  }
-  require_finite(array, name);
-  return array;
-}
-
-// A caller's array is written in place, or a new one is made.
-py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
-  if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
-  if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
-    throw py::value_error("out: a C-contiguous float32 array was expected");
-  }
-  auto out = object.cast<py::array_t<float>>();
-  if (out.ndim() != 2 || out.shape(0) != rows || out.shape(1) != 3) {
-    shape_error("out", "(" + std::to_string(rows) + ", 3)", out);
-  }
-  if (!out.writeable()) throw py::value_error("out: the array is read-only");
-  const std::less<const float*> before;
-  if (base != nullptr && before(base, out.data() + rows * 3) &&
-      before(out.data(), base + rows * 3)) {
-    throw py::value_error("out: an array that does not overlap base was expected");
-  }
-  return out;
-}
-
-py::array evaluate_morph(const rig::Morph& morph, const py::object& weights, const py::object& base,
-                         const py::object& out) {
-  const FloatArray w = vector_argument(weights, "blend_shapes", morph.channel_count);
-  require_finite(w, "blend_shapes");
-  const auto vertices = static_cast<py::ssize_t>(morph.vertex_count);
-  const FloatArray from = base.is_none() ? FloatArray() : matrix_argument(base, "base", vertices);
-  const float* start = base.is_none() ? nullptr : from.data();
-  py::array_t<float> to = output_argument(out, vertices, start);
-  rig::evaluate_morph(morph, w.data(), start, to.mutable_data());
-  return to;
-}
-
-rig::SpaceConvention space_argument(const py::object& axes, float scale, float radians,
-                                    const std::array<int, 3>& sequence,
-                                    const std::array<float, 3>& signs) {
-  rig::SpaceConvention convention;
-  const FloatArray rows = matrix_argument(axes, "axes", 3);
-  std::copy(rows.data(), rows.data() + 9, convention.axes.begin());
-  convention.scale = scale;
-  if (std::set<int>(sequence.begin(), sequence.end()) != std::set<int>{0, 1, 2}) {
-    throw py::value_error("sequence: the numbers 0, 1 and 2 in some order were expected");
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    convention.euler.order[i] = static_cast<std::uint8_t>(sequence[i]);
-  }
-  convention.euler.signs = signs;
-  convention.euler.radians_per_unit = radians;
-  return convention;
-}
-
-std::shared_ptr<rig::BoneSpace> make_bone_space(const py::object& neutral_rotations,
-                                                const std::vector<std::uint32_t>& bones,
-                                                const py::object& axes, float scale, float radians,
-                                                const std::array<int, 3>& sequence,
-                                                const std::array<float, 3>& signs) {
-  const FloatArray neutral = FloatArray::ensure(neutral_rotations);
-  if (!neutral || neutral.ndim() != 2 || neutral.shape(1) != 3) {
-    throw py::value_error("neutral_rotations: an array of shape (joints, 3) was expected");
-  }
-  const auto joints = static_cast<std::uint32_t>(neutral.shape(0));
-  for (const std::uint32_t joint : bones) {
-    if (joint >= joints) {
-      throw py::value_error("bones: joint " + std::to_string(joint) + " of " +
-                            std::to_string(joints));
-    }
-  }
-  const rig::SpaceConvention convention = space_argument(axes, scale, radians, sequence, signs);
-  return std::make_shared<rig::BoneSpace>(
-      rig::make_bone_space(convention, neutral.data(), joints, bones));
-}
-
-py::tuple evaluate_bones(const rig::BoneSpace& space, const py::object& joints) {
-  const FloatArray deltas = FloatArray::ensure(joints);
-  if (!deltas || deltas.ndim() != 2 || deltas.shape(0) != space.joint_count ||
-      deltas.shape(1) != 9) {
-    throw py::value_error("joints: an array of shape (" + std::to_string(space.joint_count) +
-                          ", 9) was expected");
-  }
-  const auto count = static_cast<py::ssize_t>(space.bones.size());
-  py::array_t<float> location({count, py::ssize_t{3}});
-  py::array_t<float> rotation({count, py::ssize_t{4}});
-  py::array_t<float> scale({count, py::ssize_t{3}});
-  rig::evaluate_bones(space, deltas.data(), location.mutable_data(), rotation.mutable_data(),
-                      scale.mutable_data());
-  return py::make_tuple(location, rotation, scale);
 }
 
 py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t> shape) {
@@ -374,17 +258,21 @@ PoseArrays evaluate_batch(const rig::Rig& rig, const py::object& raw, std::uint3
   return out;
 }
 
-void bind_rig_class(py::module_& m) {
-  py::class_<rig::Rig, std::shared_ptr<rig::Rig>>(
-      m, "Rig", "A compiled face: turns raw controls into a Pose. Immutable, shared freely.")
-      .def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
-           py::arg("rotation") = "euler", py::arg("simd") = py::none())
-      .def_static(
-          "from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
-          py::arg("simd") = py::none(),
-          "A Rig from what to_bytes or block gave, of this version and byte order. A "
-          "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
-          "other buffer is copied. trusted leaves out the hash and the check of every index.")
+using RigClass = py::class_<rig::Rig, std::shared_ptr<rig::Rig>>;
+
+py::list texts(const auto& list) {
+  py::list out;
+  for (const auto& text : list) out.append(to_python(text));
+  return out;
+}
+
+// A Rig as bytes and as a file, there and back.
+void bind_rig_bytes(RigClass& c) {
+  c.def_static("from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
+               py::arg("simd") = py::none(),
+               "A Rig from what to_bytes or block gave, of this version and byte order. A "
+               "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
+               "other buffer is copied. trusted leaves out the hash and the check of every index.")
       .def(
           "to_bytes",
           [](const rig::Rig& r) {
@@ -404,30 +292,22 @@ void bind_rig_class(py::module_& m) {
                   "flipped bit may then end the process. mapped uses the pages of a trusted file "
                   "in place: they may only be replaced as a whole file and not be written to or "
                   "cut while the Rig lives. Raises DnaError.")
-      .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.")
-      .def_property_readonly("raw_control_names",
-                             [](const rig::Rig& r) {
-                               py::list out;
-                               for (const auto& n : r.raw_control_names()) out.append(to_python(n));
-                               return out;
-                             })
+      .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.");
+}
+
+// The names, counts and joints of a Rig.
+void bind_rig_contents(RigClass& c) {
+  c.def_property_readonly("raw_control_names",
+                          [](const rig::Rig& r) { return texts(r.raw_control_names()); })
       .def_property_readonly("gui_control_names",
-                             [](const rig::Rig& r) {
-                               py::list out;
-                               for (const auto& n : r.gui_control_names()) out.append(to_python(n));
-                               return out;
-                             })
+                             [](const rig::Rig& r) { return texts(r.gui_control_names()); })
       .def_readonly("joint_count", &rig::Rig::joint_count)
       .def_readonly("blend_shape_count", &rig::Rig::blend_shape_count)
       .def_readonly("animated_map_count", &rig::Rig::animated_map_count)
       .def_readonly("lod_count", &rig::Rig::lod_count)
       .def_readonly("control_count", &rig::Rig::control_count)
       .def_property_readonly("ignored_layers",
-                             [](const rig::Rig& r) {
-                               py::list out;
-                               for (const auto& id : r.ignored_layers()) out.append(to_python(id));
-                               return out;
-                             })
+                             [](const rig::Rig& r) { return texts(r.ignored_layers()); })
       .def_property_readonly("memory_bytes", &rig::Rig::memory_bytes)
       .def_property_readonly("simd", [](const rig::Rig& r) { return r.kernels->name; })
       .def_property_readonly("neutral_joints",
@@ -447,21 +327,22 @@ void bind_rig_class(py::module_& m) {
                           {static_cast<py::ssize_t>(r.raw_count)});
           },
           "float32[R]: 0, but 1 for the w of each rotation that solvers and setups read.")
-      .def_property_readonly("joint_indices_written",
-                             [](const rig::Rig& r) {
-                               return py::array_t<std::uint16_t>(
-                                   static_cast<py::ssize_t>(r.joints_written.size()),
-                                   r.joints_written.data());
-                             })
-      .def(
-          "gui_to_raw",
-          [](const rig::Rig& r, const py::object& gui) {
-            const FloatArray in = vector_argument(gui, "gui", r.gui_count);
-            py::array_t<float> raw(static_cast<py::ssize_t>(r.raw_count));
-            rig::gui_to_raw(r, in.data(), raw.mutable_data());
-            return raw;
-          },
-          py::arg("gui"), "float32[G] -> float32[R] in [0, 1]")
+      .def_property_readonly("joint_indices_written", [](const rig::Rig& r) {
+        return py::array_t<std::uint16_t>(static_cast<py::ssize_t>(r.joints_written.size()),
+                                          r.joints_written.data());
+      });
+}
+
+void bind_rig_evaluation(RigClass& c) {
+  c.def(
+       "gui_to_raw",
+       [](const rig::Rig& r, const py::object& gui) {
+         const FloatArray in = vector_argument(gui, "gui", r.gui_count);
+         py::array_t<float> raw(static_cast<py::ssize_t>(r.raw_count));
+         rig::gui_to_raw(r, in.data(), raw.mutable_data());
+         return raw;
+       },
+       py::arg("gui"), "float32[G] -> float32[R] in [0, 1]")
       .def(
           "raw_to_gui",
           [](const rig::Rig& r, const py::object& raw) {
@@ -490,44 +371,14 @@ void bind_rig_class(py::module_& m) {
            [](const std::shared_ptr<rig::Rig>& r) { return PyInstance{r, rig::Instance(*r)}; });
 }
 
-void bind_morph(py::module_& m) {
-  py::class_<rig::Morph, std::shared_ptr<rig::Morph>>(
-      m, "Morph", "The blend shape targets of one mesh, compiled for summing.")
-      .def(py::init([](const dna::Dna& dna, std::size_t mesh_index, const py::object& matrix) {
-             std::array<float, 9> rows{1, 0, 0, 0, 1, 0, 0, 0, 1};
-             if (!matrix.is_none()) {
-               const FloatArray given = matrix_argument(matrix, "matrix", 3);
-               std::copy(given.data(), given.data() + 9, rows.begin());
-             }
-             return std::make_shared<rig::Morph>(
-                 unwrap(compile::compile_morph(dna, mesh_index, rows)));
-           }),
-           py::arg("dna"), py::arg("mesh_index"), py::kw_only(), py::arg("matrix") = py::none())
-      .def_readonly("vertex_count", &rig::Morph::vertex_count)
-      .def_property_readonly("channel_indices",
-                             [](const rig::Morph& s) {
-                               return py::array_t<std::uint16_t>(
-                                   static_cast<py::ssize_t>(s.channels.size()), s.channels.data());
-                             })
-      .def_property_readonly("memory_bytes", &rig::Morph::memory_bytes)
-      .def("evaluate", &evaluate_morph, py::arg("blend_shapes"), py::arg("base") = py::none(),
-           py::arg("out") = py::none(),
-           "float32[B] -> float32[V, 3]: base + sum of weight * delta.");
-}
-
-void bind_bone_space(py::module_& m) {
-  py::class_<rig::BoneSpace, std::shared_ptr<rig::BoneSpace>>(
-      m, "BoneSpace",
-      "Poses of joints to what another program keeps on bones that rest in the neutral pose, in "
-      "axes and units of its own.")
-      .def(py::init(&make_bone_space), py::arg("neutral_rotations"), py::arg("bones"),
-           py::kw_only(), py::arg("axes"), py::arg("scale") = 1.0f, py::arg("radians") = 1.0f,
-           py::arg("sequence") = std::array<int, 3>{0, 1, 2},
-           py::arg("signs") = std::array<float, 3>{1, 1, 1},
-           "neutral_rotations float32[J, 3]; bones: the joint of each; v' = scale * axes @ v; "
-           "radians per unit of angle; sequence: axes in the order of rotation; signs of angles.")
-      .def("evaluate", &evaluate_bones, py::arg("joints"),
-           "float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3]).");
+void bind_rig_class(py::module_& m) {
+  RigClass c(m, "Rig",
+             "A compiled face: turns raw controls into a Pose. Immutable, shared freely.");
+  c.def(py::init(&make_rig), py::arg("dna"), py::kw_only(), py::arg("precision") = "float32",
+        py::arg("rotation") = "euler", py::arg("simd") = py::none());
+  bind_rig_bytes(c);
+  bind_rig_contents(c);
+  bind_rig_evaluation(c);
 }
 
 }  // namespace
@@ -571,8 +422,6 @@ void bind_rig(py::module_& m) {
           py::arg("raw"), py::arg("check") = false,
           "float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then.");
   bind_rig_class(m);
-  bind_morph(m);
-  bind_bone_space(m);
   m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
   m.def(
       "compile_version", [] { return compile::kVersion; },

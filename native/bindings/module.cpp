@@ -13,6 +13,7 @@ void bind_dna(py::module_& m);
 void bind_edit(py::module_& m);
 void bind_files(py::module_& m);
 void bind_mixer(py::module_& m);
+void bind_outputs(py::module_& m);
 void bind_rig(py::module_& m);
 void bind_solve(py::module_& m);
 
@@ -52,6 +53,7 @@ PYBIND11_MODULE(_native, m) {
   m.attr("DnaError") = pybind11::handle(risorius::bindings::dna_error_type);
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
+  risorius::bindings::bind_outputs(m);
   risorius::bindings::bind_solve(m);
   risorius::bindings::bind_edit(m);
   risorius::bindings::bind_author(m);

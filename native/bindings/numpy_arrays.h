@@ -70,6 +70,18 @@ py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
                         py::str(given.attr("shape")).cast<std::string>());
 }
 
+using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
+/// A list of numbers as one of float32. Raises ValueError where it is none, or of another length.
+inline FloatArray vector_argument(const py::object& object, const char* name, std::size_t length) {
+  FloatArray array = FloatArray::ensure(object);
+  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  if (array.ndim() != 1 || static_cast<std::size_t>(array.shape(0)) != length) {
+    shape_error(name, "(" + std::to_string(length) + ",)", array);
+  }
+  return array;
+}
+
 /// Copies any sequence of numbers into a core array. In: name  of the argument, for errors.
 /// Raises ValueError where it is none, or where whole numbers do not fit T.
 template <class T>

@@ -32,7 +32,7 @@ get_tools() {
 # no threads, and nothing is caught there: without memory the library ends, and the page says so. What is of
 # one folder is compiled at once.
 sources() { # sources FOLDER
-  find "$project/native/$1" -name '*.cpp' -not -name json.cpp -not -name write.cpp -not -name rig_file.cpp \
+  find "$project/native/$1" -name '*.cpp' -not -name 'json_*.cpp' -not -name write.cpp -not -name rig_file.cpp \
     -not -name 'file_*.cpp' -not -name read_at.cpp -not -name change_of_basis.cpp \
     -not -name coordinates.cpp | LC_ALL=C sort
 }

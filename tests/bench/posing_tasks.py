@@ -300,13 +300,15 @@ def solutions(face, raw, vertex, wanted, mirrored):
         points.append((face.mesh, twin))
         targets.append(wanted[twin])
     axes = np.tile(face.screen, (len(points), 1, 1))
+    limits = risorius.ControlLimits(free)
+    sharing = risorius.ControlSharing(ease, partners, face.opposites)
     solved = risorius.solve_drag(
-        face.surface, raw, points, targets, axes=axes, free=free, ease=ease, partners=partners,
-        opposites=face.opposites, method="sparse",
+        face.surface, raw, points, targets, axes=axes, limits=limits, sharing=sharing,
+        method="sparse",
     )  # fmt: skip
     yield np.asarray(solved.raw, float), 0  # no key held
     alone = risorius.best_controls(
-        face.surface, raw, points[0], targets[0], axes=face.screen, free=free, count=3
+        face.surface, raw, points[0], targets[0], axes=face.screen, limits=limits, count=3
     )
     for tab, (control, _value, _left) in enumerate(alone):
         only = np.zeros(len(raw), bool)
@@ -314,8 +316,9 @@ def solutions(face, raw, vertex, wanted, mirrored):
         if mirrored:
             only[face.partners[control]] = True
         solved = risorius.solve_drag(
-            face.surface, raw, points, targets, axes=axes, free=only & free, partners=partners,
-            opposites=face.opposites,
+            face.surface, raw, points, targets, axes=axes,
+            limits=risorius.ControlLimits(only & free),
+            sharing=risorius.ControlSharing(partners=partners, opposites=face.opposites),
         )  # fmt: skip
         yield np.asarray(solved.raw, float), 2 + 2 * tab  # Ctrl down and up, Tab
 

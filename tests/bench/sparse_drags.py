@@ -138,10 +138,12 @@ def drag(face: Skin, case: Case, method: str, ease: bool = False):
         free[[c for a, b in face.opposites if face.partners[a] == b for c in (a, b)]] = False
     given = {
         "axes": np.tile(face.screen, (len(case.vertices), 1, 1)),
-        "free": free,
-        "partners": face.partners if case.mirrored else None,
-        "opposites": face.opposites,
-        "ease": risorius.local_ease(face.surface, reach) if ease else None,
+        "limits": risorius.ControlLimits(free),
+        "sharing": risorius.ControlSharing(
+            ease=risorius.local_ease(face.surface, reach) if ease else None,
+            partners=face.partners if case.mirrored else None,
+            opposites=face.opposites,
+        ),
     }
     points = [(face.mesh, v) for v in case.vertices]
     begin = time.process_time()

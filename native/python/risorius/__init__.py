@@ -51,6 +51,7 @@ from .base.version import __version__ as __version__
 from .rigs.cache import compile_cached
 from .rigs.load import Finding, check, load
 from .solving.clip import SolvedClip, solve_clip
+from .solving.controls import ControlLimits, ControlSharing
 from .solving.drag import Solved, best_controls, local_ease, solve_drag
 from .solving.handles import place_handles
 from .solving.surface import Surface
@@ -65,6 +66,8 @@ __all__ = [
     "ClipReader",
     "ClipWriter",
     "Conditionals",
+    "ControlLimits",
+    "ControlSharing",
     "Dna",
     "DnaError",
     "Event",

@@ -427,6 +427,58 @@ def test_what_makes_no_sense_is_one_sentence(face, change, said):
         risorius.solve_drag(face[1], **given)
 
 
+GIVEN = {
+    "free": [True] * 5 + [False, True],
+    "lowest": -0.1,
+    "highest": [0.9] * 7,
+    "ease": [1, 1, 0.5, 0.01, 1, 1, 0.2],
+    "partners": PARTNERS,
+    "opposites": [(PUFF, WIDEN)],
+}
+
+
+def drag_of(face, method="sparse", **given):
+    goal = face[1].positions(raw(left=0.6, puff=0.3), 0, [75])
+    return risorius.solve_drag(face[1], raw(jaw=0.1), [(0, 75)], goal, method=method, **given)
+
+
+def structures():
+    limits = risorius.ControlLimits(**{name: GIVEN[name] for name in ("free", "lowest", "highest")})
+    return limits, risorius.ControlSharing(GIVEN["ease"], GIVEN["partners"], GIVEN["opposites"])
+
+
+@pytest.mark.parametrize("method", ["least_squares", "transpose", "sparse"])
+def test_structures_and_their_fields_as_keywords_solve_the_same(face, method):
+    limits, sharing = structures()
+    solved = drag_of(face, method, limits=limits, sharing=sharing)
+    np.testing.assert_array_equal(solved.raw, drag_of(face, method, **GIVEN).raw)
+    assert (solved.raw != drag_of(face, method).raw).any()
+
+
+def test_limits_are_the_same_structure_for_a_drag_a_ranking_and_a_clip(face):
+    limits, surface = structures()[0], face[1]
+    fields = {name: GIVEN[name] for name in ("free", "lowest", "highest")}
+    goal = surface.positions(raw(left=0.6, puff=0.3), 0, [75])[0]
+    ranked = risorius.best_controls(surface, raw(), (0, 75), goal, limits=limits)
+    assert ranked == risorius.best_controls(surface, raw(), (0, 75), goal, **fields)
+    frames = np.stack([surface.positions(raw(left=share), 0) for share in (0.0, 0.5, 0.95)])
+    both = [
+        risorius.solve_clip(surface, frames, rate=30, **given).clip
+        for given in ({"limits": limits}, fields)
+    ]
+    assert both[0].to_bytes() == both[1].to_bytes()
+
+
+def test_a_structure_beside_its_fields_or_an_unknown_keyword_is_refused(face):
+    limits, sharing = structures()
+    with pytest.raises(risorius.RisoriusError, match="limits: no free, lowest beside it"):
+        drag_of(face, limits=limits, free=True, lowest=0)
+    with pytest.raises(risorius.RisoriusError, match="sharing: no ease beside it"):
+        drag_of(face, sharing=sharing, ease=1)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'higest'"):
+        drag_of(face, higest=1)
+
+
 def performance(face, frames=40):
     """Curves of four controls that are seen, and float32[F, V, 3]."""
     t = np.arange(frames) / 30

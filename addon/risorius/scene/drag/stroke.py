@@ -200,8 +200,8 @@ class Stroke:
         anchors = self._of()
         goal, axes = self._goal(anchors, target - self._apart, view)
         self.best = native.module().best_controls(
-            self.skin.surface, self.state.seen, self.point, goal[0], axes=axes[0], free=free,
-            lowest=self.state.low, highest=self.state.high,
+            self.skin.surface, self.state.seen, self.point, goal[0], axes=axes[0],
+            limits=self._limits(free),
         )  # fmt: skip
         only = np.zeros(len(free), bool)
         if self.best:
@@ -219,14 +219,20 @@ class Stroke:
         goal, axes = self._goal(anchors, target, view)
         near = self.options.method == "near"
         method = "sparse" if near else self.options.method
-        solved = native.module().solve_drag(
-            self.skin.surface, self.state.seen, anchors.points, goal, axes=axes, free=free,
-            lowest=self.state.low, highest=self.state.high, opposites=self._opposites,
-            partners=self._partners if self._is_symmetric else None, method=method,
+        sharing = native.module().ControlSharing(
             ease=self._ease() if near else None,
+            partners=self._partners if self._is_symmetric else None,
+            opposites=self._opposites,
+        )
+        solved = native.module().solve_drag(
+            self.skin.surface, self.state.seen, anchors.points, goal, axes=axes,
+            limits=self._limits(free), sharing=sharing, method=method,
         )  # fmt: skip
         moved = solved.positions[0].astype(np.float64) - anchors.rest[0]
         return solved.raw, anchors.world[0] + anchors.maps[0] @ moved
+
+    def _limits(self, free: NDArray[np.bool_]) -> native.ControlLimits:
+        return native.module().ControlLimits(free, self.state.low, self.state.high)
 
     def _goal(self, anchors: _Anchors, target: Float, view: Float | None) -> tuple[Float, Float]:
         """Targets float64[P, 3] and axes float64[P, 3, 3] of the file's space."""

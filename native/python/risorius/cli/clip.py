@@ -48,6 +48,13 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     _add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
+    _add_meaning(parser)
+    _add_steps(parser)
+    parser.set_defaults(func=run_convert)
+
+
+def _add_meaning(parser: argparse.ArgumentParser) -> None:
+    """Options that say how the values of IN are understood."""
     parser.add_argument("--mapping", metavar="M", help=_MAPPING)
     parser.add_argument(
         "--rig", type=Path, metavar="DNA", help="keep only what this rig has; its GUI table"
@@ -76,6 +83,10 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="of the head and the eyes in IN (default: radians, and a head that turns too far is "
         "refused)",
     )
+
+
+def _add_steps(parser: argparse.ArgumentParser) -> None:
+    """Options that change the clip, in the order in which they do, and the report."""
     parser.add_argument(
         "--neutral", metavar="A[:B]", help="frame or frames of a neutral face, which become 0"
     )
@@ -111,7 +122,6 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--report", action="store_true", help="print what was mapped and what was not, to stdout"
     )
-    parser.set_defaults(func=run_convert)
 
 
 def _add_input(parser: argparse.ArgumentParser) -> None:

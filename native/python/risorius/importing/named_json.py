@@ -9,31 +9,21 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..anim.clip import Event
 from ..base.budget import Budget
-from .clock.units import (
-    FRAMES,
-    Asked,
-    TimeName,
-    row_times,
-    seconds_of,
-    time_name,
-)
+from .clock.units import FRAMES, Asked, time_name
 from .errors import AnimationFileError
+from .json_reader import Doubles, Reader, first_key
 from .keys import VALUE_BYTES, Keys, on_one_clock
-from .source import Take, keep_ascending, make_clip
+from .source import Take
 from .tables import LIVE_LINK_FACE
-
-Doubles = npt.NDArray[np.float64]
 
 NAME_KEYS = (
     "facsNames", "names", "blendShapeNames", "blendshapeNames", "blendshape_names", "shapeNames",
     "curveNames", "controls", "channels",
 )  # fmt: skip
 MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
-RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate", "sampleRate")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
 # NeuroSync returns rows without names: Live Link Face's columns, and seven emotions after them.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
@@ -42,158 +32,6 @@ KEYS_KEYS = ("Keys", "keys")
 CURVE_NAME_KEYS = ("CurveName", "Name", "name", "curveName")
 INNER_CURVE_KEYS = ("FloatCurve", "Curve", "curve", "floatCurve")
 DEEPEST = 64
-# Frames a second; a rate outside this range is taken for a damaged number.
-SLOWEST, FASTEST = 0.01, 1e6
-_LARGEST = float(np.finfo(np.float32).max)
-
-
-class Reader:
-    """One file, its budget, and what the caller says of its time."""
-
-    def __init__(self, name: str, asked: Asked, budget: Budget) -> None:
-        self.name = name
-        self.asked = asked
-        self.budget = budget
-        self.notes: list[str] = []
-
-    def fail(self, message: str, place: str | None = None) -> AnimationFileError:
-        """An AnimationFileError that names the file.
-
-        Args:
-            message: what was expected and what was found.
-            place: where in the JSON, e.g. "frames[3]"; None: the whole of it.
-        """
-        return AnimationFileError(self.name, f"{place}: {message}" if place else message)
-
-    def number(self, value: object, place: str) -> float:
-        """A finite number that a float32 holds; some software writes numbers as text.
-
-        Args:
-            value: a value of the JSON.
-            place: what errors call it.
-
-        Raises:
-            AnimationFileError: it is none.
-        """
-        found = math.nan
-        if isinstance(value, int | float | str) and not isinstance(value, bool):
-            try:  # some write numbers as text
-                found = float(value)
-            except (ValueError, OverflowError):
-                found = math.nan
-        if math.isfinite(found) and abs(found) <= _LARGEST:
-            return found
-        raise self.fail(f"a finite number was expected, found {_shown(value)}", place)
-
-    def numbers(self, values: object, place: str, *, has_holes: bool = False) -> list[float]:
-        """A list of finite numbers.
-
-        Args:
-            values: a value of the JSON.
-            place: what errors call it.
-            has_holes: null is a value that is not there, and comes as NaN for `take` to fill.
-
-        Raises:
-            AnimationFileError: it is no list, or something in it is no such number.
-        """
-        if not isinstance(values, list):
-            raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
-        return [
-            math.nan if has_holes and value is None else self.number(value, f"{place}[{i}]")
-            for i, value in enumerate(values)
-        ]
-
-    def strings(self, values: object, place: str) -> list[str]:
-        """A list of names.
-
-        Args:
-            values: a value of the JSON.
-            place: what errors call it.
-
-        Raises:
-            AnimationFileError: it is no list, or something in it is no text.
-        """
-        if not isinstance(values, list) or not all(isinstance(v, str) for v in values):
-            raise self.fail(f"a list of names was expected, found {_kind(values)}", place)
-        return values
-
-    def rate_of(self, *tables: object) -> float | None:
-        """Frames a second: as the caller says, else as the first of these tables does."""
-        if self.asked.rate is not None:
-            return self.asked.rate
-        for table in tables:
-            if isinstance(table, dict) and (key := _first(table, RATE_KEYS)):
-                return self.frames_a_second(table[key], key)
-        return None
-
-    def frames_a_second(self, value: object, place: str) -> float:
-        """A rate from SLOWEST to FASTEST frames a second.
-
-        Args:
-            value: a value of the JSON.
-            place: what errors call it.
-
-        Raises:
-            AnimationFileError: it is no number, or outside that range.
-        """
-        rate = self.number(value, place)
-        if not SLOWEST <= rate <= FASTEST:
-            raise self.fail(
-                f"frames a second above 0 were expected ({SLOWEST:g} to {FASTEST:g}), "
-                f"found {rate:g}",
-                place,
-            )
-        return rate
-
-    def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """float64[count] seconds of frames: as given, else by the rate from 0 on.
-
-        Args:
-            given: a list of times out of the JSON, or None.
-            count: how many frames there are.
-            rate: frames a second; None: unknown.
-            place: the key of the times, which may say their unit, and what errors call them.
-
-        Raises:
-            AnimationFileError: another number of times, neither times nor a rate, a unit that
-                nobody knows.
-        """
-        asked = self.asked._replace(rate=rate)
-        if given is None or asked.counts_rows:
-            return row_times(count, asked, self.name)
-        times = np.array(self.numbers(given, place))
-        if times.size != count:
-            raise self.fail(f"{count} times were expected, found {times.size}", place)
-        said = time_name(place) or TimeName("")
-        return seconds_of(times, said, asked, self.notes, name=self.name, column=place)
-
-    def take(
-        self, names: Sequence[str], rows: npt.ArrayLike, times: Doubles, rate: float | None = None
-    ) -> Take:
-        """A Take of curves; frames whose time does not ascend are left out and noted.
-
-        Args:
-            names: of the curves, each once.
-            rows: float[controls, frames]; NaN where a value is not there.
-            times: float64[frames], seconds.
-            rate: frames a second; None: told from the times.
-
-        Raises:
-            AnimationFileError: a name that stands there twice.
-        """
-        if len(set(names)) != len(names):
-            twice = next(name for name in names if list(names).count(name) > 1)
-            raise self.fail(f"{twice!r} was expected once, found it twice")
-        keep = keep_ascending(times, self.notes, self.name)
-        curves = np.array(rows, np.float64).reshape(len(names), times.size)[:, keep]
-        for name, curve in zip(names, curves, strict=True):
-            holes = np.isnan(curve)
-            if holes.all() and holes.size:
-                raise self.fail("numbers were expected, found null alone", name)
-            if holes.any():
-                curve[holes] = np.interp(times[keep][holes], times[keep][~holes], curve[~holes])
-                self.notes.append(f"{name}: null in {int(holes.sum())} frame(s), filled")
-        return Take(make_clip(names, curves, times[keep], rate=rate), "json", "", self.notes)
 
 
 def parse(text: str, name: str) -> object:
@@ -321,12 +159,12 @@ def matrix(reader: Reader, document: object) -> Take | None:
         return None
     inner = document.get("metadata")
     names_in = next(
-        (t for t in (document, inner) if isinstance(t, dict) and _first(t, NAME_KEYS)), None
+        (t for t in (document, inner) if isinstance(t, dict) and first_key(t, NAME_KEYS)), None
     )
     key = next((k for k in MATRIX_KEYS if _is_rows(document.get(k))), None)
     if names_in is None or key is None:
         return None
-    names_key = _first(names_in, NAME_KEYS) or ""
+    names_key = first_key(names_in, NAME_KEYS) or ""
     names = reader.strings(names_in[names_key], names_key)
     frames = document[key]
     values, times = [], []
@@ -335,7 +173,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
         place = f"{key}[{i}]"
         if isinstance(frame, dict):
             times.append(frame.get(clock))
-            at = _first(frame, WEIGHT_KEYS)
+            at = first_key(frame, WEIGHT_KEYS)
             if at is None:
                 raise reader.fail(f"one of {', '.join(WEIGHT_KEYS)} was expected", place)
             row = reader.numbers(frame[at], f"{place}.{at}", has_holes=True)
@@ -417,7 +255,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
     # Curves with keys, and rows of a curve table, are lists of tables too.
-    if not names or any(_first(frame, CURVE_NAME_KEYS) for frame in frames):
+    if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
     key = _time_key(frames[0])
@@ -588,10 +426,6 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
     return reader.take(list(lists), rows, times, None if by_time else rate)
 
 
-def _first(table: Mapping[str, Any], keys: Sequence[str]) -> str | None:
-    return next((key for key in keys if key in table), None)
-
-
 def _is_rows(value: object) -> bool:
     """A list of lists, or of tables with a list in each."""
     if not isinstance(value, list) or not value:
@@ -616,22 +450,3 @@ def _is_number(text: str) -> bool:
         return math.isfinite(float(text))
     except ValueError:
         return False
-
-
-def _shown(value: object) -> str:
-    """A value as messages show it; of a list or a table what it is, however deep it goes."""
-    if isinstance(value, dict | list):
-        return _kind(value)
-    is_long = isinstance(value, int) and abs(value) >= 1 << 64
-    return "a long number" if is_long else str(value)[:40]
-
-
-def _kind(value: object) -> str:
-    names = {
-        dict: "a table",
-        list: "a list",
-        str: "text",
-        bool: "true or false",
-        type(None): "null",
-    }
-    return names.get(type(value), "a number")

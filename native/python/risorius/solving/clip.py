@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,8 @@ from .._native import descend
 from ..anim.clip import Clip
 from ..base.errors import ArgumentError, RisoriusError
 from ..base.given import MOST, checked, finite, shown, whole
-from .surface import Doubles, Floats, Surface, limits, numbers, vector
+from .controls import Bounds, ControlLimits, LimitFields, check_keywords, structure
+from .surface import Doubles, Floats, Surface, numbers
 
 Progress = Callable[[float], object]
 _CHUNK = 24  # frames that are solved in a row
@@ -65,8 +66,8 @@ class _Job:
     targets: Floats  # [F, P, 3]
     low: Doubles  # [R]
     high: Doubles
-    rest: Doubles
     free: npt.NDArray[np.bool_]
+    rest: Doubles
     sparse: float
     smooth: float
     rate: float
@@ -126,12 +127,11 @@ def solve_clip(
     neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None = None,
     sparse: float = 1.0,
     smooth: float = 1.0,
-    free: npt.ArrayLike | None = None,
-    lowest: npt.ArrayLike | None = None,
-    highest: npt.ArrayLike | None = None,
+    limits: ControlLimits | None = None,
     most_points: int = 4000,
     threads: int = 0,
     progress: Progress | None = None,
+    **keywords: Unpack[LimitFields],
 ) -> SolvedClip:
     """The curves of the controls that repeat a moving mesh.
 
@@ -145,11 +145,12 @@ def solve_clip(
             and not its shape, as for another face of the same topology. None: the face's own.
         sparse: how much a control's amount costs; 0 nothing, 1 as is usual.
         smooth: how much a sudden change costs; 0 nothing, 1 as is usual.
-        free: bool[R], which controls may move; None is all but the parts of rotations.
-        lowest, highest: float[R] or one number: the limits; None is 0 and 1.
+        limits: which controls may move, and between which values; None is all but the parts of
+            rotations, from 0 to 1.
         most_points: how many vertices are looked at; the residual is of all.
         threads: that work at once; 0 is all cores. The result does not depend on it.
         progress: told the share that is done, 0 to 1; False stops.
+        keywords: fields of `limits`, where it is not given.
 
     Returns:
         The clip has a curve for each control that moves at all.
@@ -158,37 +159,47 @@ def solve_clip(
         ValueError: an argument that makes no sense; the sentence names it.
         CancelledError: progress said False.
     """
+    check_keywords("solve_clip", keywords, ControlLimits)
+    limits = structure("limits", limits, ControlLimits, keywords)
     wanted = _meshes("frames", surface, frames, 3)
     surface.check_size(min(most_points, sum(surface.vertex_counts[m] for m in wanted)))
     count = _frame_count(wanted)
+    _check_numbers(rate, start, sparse, smooth)
+    checked("most_points", whole, most_points, 1, MOST)
+    checked("threads", whole, threads, 0, 1024)
+    moved = _moved(surface, wanted, neutral)
+    rest = surface.rig.initial_raw_controls.astype(np.float64)
+    bounds = limits.around(rest, _usual(surface))
+    points = _points(surface, wanted, bounds, most_points)
+    targets = _targets(moved, points)
+    noise = _noise(targets)
+    sigma, share = float(np.hypot(noise, _FLOOR_MM / surface.mm)), 1 / (3 * count)
+    job = _Job(
+        surface, points, targets, *bounds, rest, sparse, smooth, rate, sigma, progress, share
+    )
+    return _result(job, _curves(job, count, threads or os.cpu_count() or 1), moved, start, noise)
+
+
+def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> None:
     checked("rate", finite, rate, 0.01, 1e6)
     checked("start", finite, start, -1e9, 1e9)
     for name, price in (("sparse", sparse), ("smooth", smooth)):
         checked(name, finite, price, 0.0, 1e9)
-    checked("most_points", whole, most_points, 1, MOST)
-    checked("threads", whole, threads, 0, 1024)
-    moved = _moved(surface, wanted, neutral)
-    low, high = limits(surface.control_count, lowest, highest)
-    rest = surface.rig.initial_raw_controls.astype(np.float64)
-    low, high = np.minimum(low, rest), np.maximum(high, rest)
-    loose = _loose(surface, free)
-    low[~loose] = high[~loose] = rest[~loose]
-    points = _points(surface, wanted, high, loose, most_points)
-    targets = np.concatenate(
-        [moved[m][:, points[points[:, 0] == m, 1]] for m in sorted(wanted)], axis=1
+
+
+def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
+    """float32[F, P, 3]: where points int64[P, 2] are wanted."""
+    return np.concatenate(
+        [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )
-    noise = _noise(targets)
-    job = _Job(
-        surface, points, targets, low, high, rest, loose, sparse, smooth, rate,
-        float(np.hypot(noise, _FLOOR_MM / surface.mm)), progress, 1 / (3 * count),
-    )  # fmt: skip
-    workers = threads or os.cpu_count() or 1
+
+
+def _curves(job: _Job, count: int, workers: int) -> Doubles:
+    """float64[F, R]: of each frame by itself, then of all together."""
     begins = _begins(job, count)
     left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
     job.sigma = max(job.sigma, float(np.sqrt(left)))  # another face is never wholly repeated
-    curves = _alone(job, count, begins, workers)
-    curves = _together(job, curves, workers)
-    return _result(job, curves, moved, rate, start, noise)
+    return _together(job, _alone(job, count, begins, workers), workers)
 
 
 def _begins(job: _Job, count: int) -> dict[int, Doubles]:
@@ -337,7 +348,7 @@ def _smoothed(
 
 
 def _result(
-    job: _Job, curves: Doubles, moved: dict[int, Floats], rate: float, start: float, noise: float
+    job: _Job, curves: Doubles, moved: dict[int, Floats], start: float, noise: float
 ) -> SolvedClip:
     surface = job.surface
     frame_sum, largest, total = np.zeros(len(curves)), 0.0, 0
@@ -357,7 +368,7 @@ def _result(
         total += count
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > _ENOUGH)
     names = surface.rig.raw_control_names
-    clip = Clip([names[i] for i in used], curves.T[used], rate, start=start)
+    clip = Clip([names[i] for i in used], curves.T[used], job.rate, start=start)
     frame = np.sqrt(frame_sum / max(1, total)).astype(np.float32)
     return SolvedClip(clip, frame, by_vertex, float(np.sqrt(largest)), noise)
 
@@ -380,11 +391,7 @@ def _noise(targets: Floats) -> float:
 
 
 def _points(
-    surface: Surface,
-    wanted: dict[int, Floats],
-    high: Doubles,
-    free: npt.NDArray[np.bool_],
-    most: int,
+    surface: Surface, wanted: dict[int, Floats], bounds: Bounds, most: int
 ) -> npt.NDArray[np.int64]:
     """int64[P, 2]: the vertices that a control moves at rest, evenly taken."""
     if most < 1:
@@ -396,7 +403,7 @@ def _points(
         for part in np.array_split(every, len(every) // 1024 + 1):
             points = np.stack([np.full(len(part), mesh), part], axis=1)
             probe = surface.probe(points)
-            probe.linearise(rest, high, free)
+            probe.linearise(rest, bounds.high, bounds.free)
             moves = np.abs(probe.jacobian()).max(axis=(1, 2), initial=0) * surface.mm > 0.1
             found.append(points[moves])
     points = np.concatenate(found)
@@ -455,9 +462,8 @@ def _moved(
     return {m: frames - own[m] + surface.positions(rest, m) for m, frames in wanted.items()}
 
 
-def _loose(surface: Surface, free: npt.ArrayLike | None) -> npt.NDArray[np.bool_]:
-    if free is not None:
-        return vector("free", free, surface.control_count).astype(bool)
+def _usual(surface: Surface) -> npt.NDArray[np.bool_]:
+    """bool[R]: all controls but the parts of rotations."""
     parts = {f"{stem}{part}" for stem in (".", ".q") for part in "xyzw"}
     names = surface.rig.raw_control_names
     return np.array([not any(name.endswith(part) for part in parts) for name in names], bool)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,14 @@ import numpy.typing as npt
 from ..base.errors import ArgumentError
 from ..base.given import MOST, checked, finite
 from ..base.given import whole as whole_number
+from .controls import (
+    ControlLimits,
+    ControlSharing,
+    DragFields,
+    LimitFields,
+    check_keywords,
+    structure,
+)
 from .few import BEHIND_MM, few_controls, nearer, prices
 from .pull import ON, Drag, least_squares, make_drag
 from .surface import Doubles, Floats, Surface, numbers, vector, wholes
@@ -53,15 +61,12 @@ def solve_drag(
     *,
     axes: npt.ArrayLike | None = None,
     weights: npt.ArrayLike | None = None,
-    free: npt.ArrayLike | None = None,
-    lowest: npt.ArrayLike | None = None,
-    highest: npt.ArrayLike | None = None,
-    ease: npt.ArrayLike | None = None,
-    partners: npt.ArrayLike | None = None,
-    opposites: Sequence[tuple[int, int]] = (),
+    limits: ControlLimits | None = None,
+    sharing: ControlSharing | None = None,
     method: str = "least_squares",
     smallest: float = 1e-3,
     rounds: int = 4,
+    **keywords: Unpack[DragFields],
 ) -> Solved:
     """The smallest change of the controls that brings points where they are wanted.
 
@@ -73,16 +78,8 @@ def solve_drag(
         axes: float[P, k, 3]: unit vectors along which each point counts, e.g. two of a screen,
             which leave the depth free; None is all three.
         weights: float[P], how much each point counts; None is 1.
-        free: bool[R], which controls may change; None is all.
-        lowest, highest: float[R] or one number: the limits; None is 0 and 1. A control that is
-            beyond them may stay where it is.
-        ease: float[R] above 0, how readily each control changes: one of 0.1 costs ten times as
-            much; of two partners the readier one counts; None is 1.
-        partners: int[R], each control's partner, itself where it has none: the two change alike, as
-            left and right of a symmetric drag; None is no partners.
-        opposites: pairs of controls of which one at most shall be on, as mouthLeft and mouthRight.
-            A face whose halves differ finds a use for both at once, and nobody wants that. Two that
-            are partners as well stay as they are.
+        limits: which controls may change, and between which values; None is all, from 0 to 1.
+        sharing: how readily each control changes, and which go together; None is all alike.
         method: "least_squares"; "transpose", which takes the controls that move the points
             themselves by as much as they do so: surprises less far from the drag; or "sparse", few
             controls, about one for each direction that counts, which may leave some of the
@@ -92,43 +89,54 @@ def solve_drag(
         smallest: how much a small change is worth, beside the reach of the strongest control; more
             gives up some of the target.
         rounds: how often at most the face is looked at anew on the way.
+        keywords: fields of `limits` and `sharing`, where these are not given.
 
     Raises:
         ValueError: an argument that makes no sense; the sentence names it.
     """
-    at = vector("raw", raw, len(surface.rig.raw_control_names))
+    check_keywords("solve_drag", keywords, ControlLimits, ControlSharing)
+    limits = structure("limits", limits, ControlLimits, keywords)
+    sharing = structure("sharing", sharing, ControlSharing, keywords)
+    begin = vector("raw", raw, len(surface.rig.raw_control_names))
     if method not in METHODS:
         raise ArgumentError(f"method: {' or '.join(METHODS)} was expected, found {method!r}")
     checked("smallest", finite, smallest, 1e-12, 1e12)
     checked("rounds", whole_number, rounds, 0, 1000)
-    begin = at
-    drag = make_drag(
-        surface, begin, points, targets, axes, weights, free, lowest, highest, partners, ease
-    )
-
-    pairs = _pairs(opposites, len(begin))
-
-    def solve(drag: Drag, start: Doubles) -> Doubles:
-        if method == "transpose":
-            return _transposed(drag, begin, rounds)
-        if method == "sparse":
-            return few_controls(drag, begin, smallest, rounds)
-        return least_squares(drag, begin, start, smallest, rounds)
-
-    at = _kept_apart(drag, begin, pairs, solve)
-    if method == "sparse" and drag.far(at) > BEHIND_MM:
-        alike = replace(drag, unknowns=drag.unknowns.alike())
-
-        def exactly(drag: Drag, start: Doubles) -> Doubles:
-            return least_squares(drag, begin, start, smallest, rounds)
-
-        at = nearer(
-            alike, prices(drag)[0], begin, at, _kept_apart(alike, begin, pairs, exactly), pairs
-        )
+    drag = make_drag(surface, begin, points, targets, axes, weights, limits, sharing)
+    pairs = _pairs(sharing.opposites, len(begin))
+    at = _solved(drag, begin, pairs, method, smallest, rounds)
     positions = drag.positions(at)
     error = drag.error(drag.residual(positions))
     change = float(np.linalg.norm(at - begin))
     return Solved(at.astype(np.float32), positions.astype(np.float32), error, change)
+
+
+def _solved(
+    drag: Drag,
+    begin: Doubles,
+    pairs: npt.NDArray[np.int64],
+    method: str,
+    smallest: float,
+    rounds: int,
+) -> Doubles:
+    """float64[R]: the pose that a method finds, of two opposites one at most."""
+
+    def exactly(drag: Drag, start: Doubles) -> Doubles:
+        return least_squares(drag, begin, start, smallest, rounds)
+
+    def transposed(drag: Drag, _: Doubles) -> Doubles:
+        return _transposed(drag, begin, rounds)
+
+    def few(drag: Drag, _: Doubles) -> Doubles:
+        return few_controls(drag, begin, smallest, rounds)
+
+    solve = {"least_squares": exactly, "transpose": transposed, "sparse": few}[method]
+    at = _kept_apart(drag, begin, pairs, solve)
+    if method == "sparse" and drag.far(at) > BEHIND_MM:
+        alike = replace(drag, unknowns=drag.unknowns.alike())
+        every = _kept_apart(alike, begin, pairs, exactly)
+        at = nearer(alike, prices(drag)[0], begin, at, every, pairs)
+    return at
 
 
 def _pairs(opposites: Sequence[tuple[int, int]], count: int) -> npt.NDArray[np.int64]:
@@ -225,10 +233,9 @@ def best_controls(
     target: npt.ArrayLike,
     *,
     axes: npt.ArrayLike | None = None,
-    free: npt.ArrayLike | None = None,
-    lowest: npt.ArrayLike | None = None,
-    highest: npt.ArrayLike | None = None,
+    limits: ControlLimits | None = None,
     count: int = 8,
+    **keywords: Unpack[LimitFields],
 ) -> list[tuple[int, float, float]]:
     """The controls that alone bring a point nearest to a target, best first.
 
@@ -238,9 +245,9 @@ def best_controls(
         point: (mesh, vertex).
         target: float[3] in the file's units.
         axes: float[k, 3]: unit vectors along which the point counts; None is all three.
-        free: bool[R], which controls may change; None is all.
-        lowest, highest: float[R] or one number: the limits; None is 0 and 1.
+        limits: which controls may change, and between which values; None is all, from 0 to 1.
         count: how many at most.
+        keywords: fields of `limits`, where it is not given.
 
     Returns:
         (control, the value that it would take, how far the point then is from its target along the
@@ -249,11 +256,13 @@ def best_controls(
     Raises:
         ValueError: an argument that makes no sense; the sentence names it.
     """
+    check_keywords("best_controls", keywords, ControlLimits)
+    limits = structure("limits", limits, ControlLimits, keywords)
     at = vector("raw", raw, len(surface.rig.raw_control_names))
     checked("count", whole_number, count, 0, MOST)
     along = None if axes is None else numbers("axes", axes)[None]
     goal = numbers("target", target)[None]
-    drag = make_drag(surface, at, [point], goal, along, None, free, lowest, highest)
+    drag = make_drag(surface, at, [point], goal, along, None, limits, ControlSharing())
     jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
     square = (jacobian**2).sum(axis=0)
     toward = np.clip(at + jacobian.T @ missing / np.maximum(square, 1e-30), drag.low, drag.high)

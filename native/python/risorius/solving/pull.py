@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from .._native import Probe, least_change
 from ..base.errors import ArgumentError
-from .surface import Doubles, Surface, limits, numbers, vector, wholes
+from .controls import ControlLimits, ControlSharing
+from .surface import Doubles, Surface, numbers, vector, wholes
 
 ON = 1e-6  # a control that changes by less is where it was
 _GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
@@ -76,17 +77,13 @@ def make_drag(
     targets: npt.ArrayLike,
     axes: npt.ArrayLike | None,
     weights: npt.ArrayLike | None,
-    free: npt.ArrayLike | None,
-    lowest: npt.ArrayLike | None,
-    highest: npt.ArrayLike | None,
-    partners: npt.ArrayLike | None = None,
-    ease: npt.ArrayLike | None = None,
+    limits: ControlLimits,
+    sharing: ControlSharing,
 ) -> Drag:
     """A drag, checked.
 
     Args:
-        surface, raw, points, targets, axes, weights, free, lowest, highest, partners, ease: as of
-            solve_drag.
+        surface, raw, points, targets, axes, weights, limits, sharing: as of solve_drag.
 
     Raises:
         ArgumentError: one that makes no sense.
@@ -106,18 +103,15 @@ def make_drag(
     weight = vector("weights", 1.0 if weights is None else weights, count)
     if (weight < 0).any():
         raise ArgumentError(f"weights: numbers from 0 were expected, found {weight.min():g}")
-    low, high = limits(len(raw), lowest, highest)
-    low, high = np.minimum(low, raw), np.maximum(high, raw)
-    loose = vector("free", True if free is None else free, len(raw)).astype(bool)
-    low[~loose] = high[~loose] = raw[~loose]
+    low, high, free = limits.around(raw)
     surface.check_size(count)
     probe = surface.probe(dragged)
-    easy = vector("ease", 1.0 if ease is None else ease, len(raw))
-    unknowns = _unknowns(len(raw), partners, easy)
+    easy = vector("ease", 1.0 if sharing.ease is None else sharing.ease, len(raw))
+    unknowns = _unknowns(len(raw), sharing.partners, easy)
     # A pair is as ready as its readier half: the other half alone would hold both back.
     pair = easy.copy()
     pair[unknowns.first] = pair[unknowns.second] = unknowns.ease
-    return Drag(probe, loose, wanted, along, np.sqrt(weight), low, high, pair, unknowns, surface.mm)
+    return Drag(probe, free, wanted, along, np.sqrt(weight), low, high, pair, unknowns, surface.mm)
 
 
 @dataclass

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// Private to native/author.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "author/fitting/problem.h"
+
+namespace risorius::author::detail {
+
+/// The weights by joint.
+struct ByJoint {
+  struct Entry {
+    std::uint32_t vertex;
+    double weight;
+  };
+  std::vector<std::vector<Entry>> of;
+};
+
+inline ByJoint by_joint(const State& state) {
+  ByJoint out;
+  out.of.resize(state.joints.size());
+  for (std::uint32_t v = 0; v < state.weights.size(); ++v) {
+    for (const Influence& i : state.weights[v]) out.of[i.joint].push_back({v, i.weight});
+  }
+  return out;
+}
+
+}  // namespace risorius::author::detail

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// A JSON text as a tree of values. Private to native/dna/file.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+#include "dna/file/parse.h"
+
+namespace risorius::dna::detail {
+
+struct RepeatedMember {
+  std::string name;
+};
+
+// An object that does not let a later member replace an earlier one: readers would differ in which
+// of them they take.
+template <class Key, class Value, class Less, class Allocator>
+struct UniqueMap : std::map<Key, Value, Less, Allocator> {
+  using std::map<Key, Value, Less, Allocator>::map;
+  Value& operator[](const Key& key) {
+    const auto [at, added] = this->try_emplace(key);
+    // NOLINTNEXTLINE(bugprone-std-exception-baseclass): nobody but parse_document may catch it
+    if (!added) throw RepeatedMember{key};
+    return at->second;
+  }
+};
+
+// float as the type of numbers: read once, rounded once.
+using Json = nlohmann::basic_json<UniqueMap, std::vector, std::string, bool, std::int64_t,
+                                  std::uint64_t, float>;
+
+/// Fails: kNotDna (not JSON, with the byte), kInvalidValue (a member that is there twice, a number
+/// beyond every float), kLimitExceeded.
+core::Result<Json> parse_document(std::string_view text, const Limits& limits);
+
+}  // namespace risorius::dna::detail
