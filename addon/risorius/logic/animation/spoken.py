@@ -275,9 +275,10 @@ class Board:
         self._match(found, left, lambda old, new: old.frame == new.frame)
         self._match(found, left, lambda old, new: old.name == new.name)
         left = [mark for mark in left if named(_mouth_of(mark.name)) and _mouth_of(mark.name)]
-        around = [mark.frame for mark in self.placed]
-        around = [around[:1] + around[:-1], around[1:] + around[-1:]]
-        between = {old: span for old, *span in zip(self.placed, *around, strict=True)}
+        frames = [mark.frame for mark in self.placed]
+        before, behind = frames[:1] + frames[:-1], frames[1:] + frames[-1:]
+        spans = zip(before, behind, strict=True)
+        between = dict(zip(self.placed, spans, strict=True))
         self._match(found, left, lambda old, new: between[old][0] < new.frame < between[old][1])
         return found, left
 

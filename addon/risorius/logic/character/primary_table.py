@@ -152,7 +152,7 @@ def _ways_of(part: Part, side: str, index: Mapping[str, int]) -> Iterator[_Way]:
 
 def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
     """Indices of the controls that a half leads to, with their weights."""
-    out = {}
+    out: dict[int, float] = {}
     for stem, share in led.items():
         wanted = (stem + side,) if side else (stem, f"{stem}L", f"{stem}R")
         out |= {index[name]: share for name in wanted if name in index}
