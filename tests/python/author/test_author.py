@@ -554,7 +554,7 @@ def test_names_are_guessed(name, controls):
 
 def test_a_control_belongs_to_one_expression():
     found = matching.assign(["blinkLeft", "eyeBlinkLeft", "odd one"], {"eyeBlinkLeft": "eyeBlinkL"})
-    assert found == {
+    assert found.controls == {
         "blinkLeft": ["blinkLeft"],
         "eyeBlinkLeft": ["eyeBlinkL"],
         "odd one": ["odd_one"],
