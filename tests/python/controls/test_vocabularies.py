@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from risorius import expressions, importing
 from risorius.controls import arkit, vocabulary
+from risorius.controls.control_names import Meaning, UnknownControlError, find_controls
 from risorius.importing.mapping import parse_mapping
 from risorius.live.shaping import Plan
 
@@ -107,6 +108,14 @@ def test_live_names_of_any_vocabulary_move_what_they_move_in_clips():
         for column, name in enumerate(names):
             live = {c: w for c, w in zip(plan.controls, plan.matrix[:, column], strict=True) if w}
             assert live == pytest.approx(find(name)[1]), name
+
+
+@pytest.mark.parametrize("name", ["mouthSmile_L", "Mouth_Smile_L", "lipCornerPullerL"])
+def test_names_of_other_programs_may_be_typed(name):
+    found = find_controls(name, sorted(RAW))
+    assert found == Meaning({"CTRL_expressions.mouthCornerPullL": 1.0}, is_exact=False)
+    with pytest.raises(UnknownControlError, match="there is no control 'Fcl_ALL_Joy'"):
+        find_controls("Fcl_ALL_Joy", sorted(RAW))
 
 
 def test_files_that_name_a_base_as_it_was_called_still_load():
