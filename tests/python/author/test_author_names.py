@@ -54,6 +54,20 @@ def test_visemes_and_faces_become_expressions():
     assert matching.assign(["Blink"], {}).controls == {"Blink": ["eyeBlinkL", "eyeBlinkR"]}
 
 
+def test_the_names_of_icts_head_are_all_known():
+    # ARKit's with sides for browInnerUp and cheekPuff, and three of its own
+    units = [u.replace("Left", "_L").replace("Right", "_R") for u in arkit.mapping()]
+    names = [u for u in units if u not in ("browInnerUp", "cheekPuff", "tongueOut")]
+    sided = ("browInnerUp", "cheekPuff", "cheekRaiser", "PupilDilate")
+    names += [f"{name}_{side}" for name in sided for side in "LR"]
+    found = matching.assign(names, {})
+    assert sum(found.known.values()) == len(names) == 57
+    assert found.controls["browInnerUp_L"] == ["browRaiseInL"]
+    assert found.controls["cheekPuff_R"] == ["mouthCheekBlowR"]
+    assert found.controls["PupilDilate_L"] == ["eyePupilWideL"]
+    assert len(found.notes) == 2  # cheekRaiser is cheekSquint
+
+
 @pytest.mark.parametrize(
     ("names", "words"),
     [

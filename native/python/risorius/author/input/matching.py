@@ -26,7 +26,8 @@ class Assignment:
             another shape has taken, is a control of the shape's own name.
         expressions: name of an expression by shape: visemes and shapes of the whole face, which
             have a control of their own that nothing but the expression moves.
-        known: how many names are known, by the vocabulary that knows them.
+        known: how many names are known, by the vocabulary that knows them; "" of words and of
+            what a person said.
         notes: what is odd about the names, a sentence each.
     """
 
@@ -138,7 +139,7 @@ def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> Assig
         out.controls[name] = controls
         holders |= dict.fromkeys(controls, name)
     for found in guesses.values():
-        if found.vocabulary:
+        if found.rank < _Guess.rank:
             out.known[found.vocabulary] = out.known.get(found.vocabulary, 0) + 1
     out.notes.extend(_about(names, guesses))
     return out

@@ -129,7 +129,10 @@ def as_names(became: Assignment) -> list[str]:
         expression = became.expressions.get(name)
         lines.append(f"{line}  # the expression {expression}" if expression else line)
     known = sum(became.known.values())
-    by = ", ".join(f"{count} of {vocabulary(name).title}" for name, count in became.known.items())
+    by = ", ".join(
+        f"{count} of {vocabulary(name).title}" if name else f"{count} by words or [controls]"
+        for name, count in became.known.items()
+    )
     return [*lines, f"# {known} of {len(became.controls)} names are known{': ' + by if by else ''}"]
 
 
