@@ -27,6 +27,7 @@ from risorius.author.geometry.simplify import attributes_of, fewer_triangles, si
 from risorius.author.input import matching, shape_face, spec
 from risorius.cli import main
 from risorius.cli.faces import author
+from risorius.controls import arkit
 
 # Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
@@ -553,7 +554,7 @@ def test_names_are_guessed(name, controls):
 
 def test_a_control_belongs_to_one_expression():
     found = matching.assign(["blinkLeft", "eyeBlinkLeft", "odd one"], {"eyeBlinkLeft": "eyeBlinkL"})
-    assert found == {
+    assert found.controls == {
         "blinkLeft": ["blinkLeft"],
         "eyeBlinkLeft": ["eyeBlinkL"],
         "odd one": ["odd_one"],
@@ -572,6 +573,30 @@ def test_a_sum_of_both_sides_is_split_softly():
     assert np.allclose(halves.sum(axis=0), whole, atol=1e-5)
     assert not halves[0][positions[:, 0] < -1].any()  # the left of the character is +x
     assert not halves[1][positions[:, 0] > 1].any()
+
+
+def test_a_unit_of_several_controls_is_divided_by_side_and_lip():
+    positions, faces = face_shapes.head()
+    mesh = shape_face.ObjMesh(positions, np.zeros((0, 2)), [list(f) for f in faces])
+    whole = face_shapes.bump(positions, 0, -5, 4)[:, None] * [0, 0, 1.0]
+    quarters = [name.removeprefix("CTRL_expressions.") for name in arkit.mapping()["mouthFunnel"]]
+    for controls in (quarters, ["mouthPressUL", "mouthPressDL"], ["browDownL", "browLateralL"]):
+        dna = shape_face.make_shape_face(
+            shape_face.ShapeSet("x", mesh, {"a": whole}), {"a": controls}
+        )
+        assert [
+            name.removeprefix("CTRL_expressions.") for name in dna.raw_control_names
+        ] == controls
+        parts = np.zeros((len(controls), *whole.shape))
+        for target in dna.meshes[0].blend_shape_targets:
+            parts[target.blend_shape_channel_index, target.vertex_indices] = target.deltas
+        assert np.allclose(parts.sum(axis=0), whole, atol=1e-4)
+        for name, part in zip(controls, parts, strict=True):
+            middle = (part[:, 2] @ positions) / part[:, 2].sum()
+            if name[-2] in "UD":
+                assert (middle[1] > -5) == (name[-2] == "U")
+            if len(controls) == 4:
+                assert (middle[0] > 0) == (name[-1] == "L")
 
 
 def refused(*arguments):

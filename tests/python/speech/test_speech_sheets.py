@@ -146,3 +146,27 @@ def test_words_are_spelled_by_the_dictionary_and_without_one_by_rule(tmp_path):
     assert spelling.spell("one", []) == [("one", letters.pronounce("one"))]
     with pytest.raises(ValueError, match="a word of the letters a to z was expected, found '!'"):
         spelling.spell("!", [])
+
+
+def test_a_face_speaks_with_visemes_of_its_own(tmp_path, voice, capsys):
+    own = expressions.Expression("aa", "A", "viseme", "", {"CTRL_expressions.viseme_aa": 1.0})
+    library, said, out = tmp_path / "anna_expressions", tmp_path / "a.tsv", tmp_path / "a.rzc"
+    library.mkdir()
+    (library / "aa.toml").write_text(expressions.text_of(own))
+    said.write_text(sheets.write(PHONES, "a.tsv"))
+    command = ["speech", str(voice), "-o", str(out), "--read", str(said), "--expressions"]
+    assert cli.main([*command, str(library)]) == 0
+    mine, ours = Clip.load(out), speech.animate(speech.listening.follow(voice, PHONES))
+    spoken = mine.curves[mine.names.index("CTRL_expressions.viseme_aa")]
+    assert spoken.max() > 0.5
+    assert 0.2 < mine.frame_times()[spoken.argmax()] < 0.5  # the two AA
+    closed = "CTRL_expressions.mouthPressUL"  # of PP, which this library lacks
+    assert np.array_equal(
+        mine.curves[mine.names.index(closed)], ours.curves[ours.names.index(closed)]
+    )
+    capsys.readouterr()
+    for wrong in (tmp_path / "nowhere", tmp_path):
+        assert cli.main([*command, str(wrong)]) == 1
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        assert str(wrong) in error

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import cast
 
 import bpy
@@ -106,12 +107,15 @@ def rig_task(
     """
     author = native.part("author")
     face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
+    library = native.part("author.input.library")
 
     def work(
         progress: Callable[[float], None], cancelled: Callable[[], bool]
     ) -> tuple[native.JointRig, list[str]]:
         odd = face.check_shapes(shapes)
-        dna = face.make_shape_face(shapes, matching.assign(shapes.expressions, {}))
+        became = matching.assign(shapes.expressions, {})
+        odd += became.notes
+        dna = face.make_shape_face(shapes, became.controls)
         options = author.RigOptions(
             author.FitOptions(joints=joints),
             tolerance_mm,
@@ -120,6 +124,10 @@ def rig_task(
         rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
         if not cancelled():
             rig.dna.save(path)
+            if became.expressions:
+                folder = library.library_folder(Path(path))
+                native.part("files.fileio").write_all(library.library_files(became, folder))
+                odd.extend(library.about_library(became, folder))
         return rig, odd
 
     return Task(work)

@@ -8,6 +8,7 @@ import json
 import sys
 from pathlib import Path
 
+from .. import expressions
 from ..anim.clip import Clip
 from ..base import signatures
 from ..base.reading import TEXT
@@ -58,6 +59,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--seed", type=whole_number(0), default=0, metavar="N", help="of the blinks"
     )
+    parser.add_argument(
+        "--expressions",
+        type=Path,
+        metavar="LIBRARY",
+        help="the face's own visemes, as author wrote them: a folder or a TOML file",
+    )
     parser.add_argument("--no-blinks", action="store_true")
     parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
     parser.add_argument(
@@ -97,6 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
     """Raises: InputError, ValueError."""
+    library = None if args.expressions is None else expressions.load(args.expressions)
     said = args.text
     if args.transcript is not None:
         data = read_bytes(args.transcript, TEXT)
@@ -118,7 +126,7 @@ def _spoken(args: argparse.Namespace) -> tuple[Heard, Clip]:
         heard = listen(args.voice, said, progress=progress if shown else None)
     clip = animate(
         heard, rate=args.rate, seed=args.seed, intensity=args.intensity,
-        blinks=not args.no_blinks, accents=not args.no_accents,
+        blinks=not args.no_blinks, accents=not args.no_accents, library=library,
     )  # fmt: skip
     metadata = {**clip.metadata, "source": args.voice.name}
     if said is not None:

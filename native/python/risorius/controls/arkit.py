@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ARKit units in terms of raw controls, and in the orders of others, read from arkit.toml.
-
-Beside them the expressions of VRM in terms of the units, read from vrm.toml.
-"""
+"""The ARKit units in terms of raw controls, and in the orders of others, read from arkit.toml."""
 
 from __future__ import annotations
 
@@ -28,26 +25,6 @@ def mapping() -> dict[str, dict[str, float]]:
 
 
 @cache
-def vrm() -> dict[str, dict[str, float]]:
-    """VRM expression, in lower case -> {ARKit unit: weight}; of VRM 0 and 1."""
-    table = _table("vrm.toml")
-    found = {name: dict(row) for name, row in table["expressions"].items()}
-    return found | {name: found[same] for name, same in table["same"].items()}
-
-
-def vrm_mapping() -> dict[str, dict[str, float]]:
-    """VRM expression, in lower case -> {raw control name as a DNA spells it: weight}."""
-    units = mapping()
-    out: dict[str, dict[str, float]] = {}
-    for name, row in vrm().items():
-        out[name] = {}
-        for unit, weight in row.items():
-            for control, share in units[unit].items():
-                out[name][control] = out[name].get(control, 0.0) + weight * share
-    return out
-
-
-@cache
 def shares() -> dict[str, str]:
     """Raw control that takes back a share of another -> that other; see `shares.share_of`."""
     rows = mapping()
@@ -70,6 +47,6 @@ def order(name: str) -> tuple[str, ...]:
 
 
 @cache
-def _table(name: str = "arkit.toml") -> dict[str, Any]:
-    text = resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+def _table() -> dict[str, Any]:
+    text = resources.files(__package__).joinpath("arkit.toml").read_text(encoding="utf-8")
     return toml.parse(text)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from .._native import Dna
 from ..base.errors import RisoriusError
-from . import arkit
+from . import arkit, vocabulary
 
 
 class UnknownControlError(RisoriusError):
@@ -37,9 +37,9 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
     """The controls that are meant by a name, or by a part of it.
 
     In this order: the name itself; what follows its last point; an ARKit unit, if the file has its
-    controls; any part of a name, then of an ARKit unit, whatever its case. Two names that differ in
-    their side only (..L and ..R, ..Left and ..Right) are one meaning. The first of these that gives
-    anything decides, and only if it gives one meaning.
+    controls; any part of a name, then of an ARKit unit, whatever its case; a name of another
+    program. Two names that differ in their side only (..L and ..R, ..Left and ..Right) are one
+    meaning. The first of these that gives anything decides, and only if it gives one meaning.
 
     Args:
         text: as a person typed it.
@@ -75,6 +75,9 @@ def _by_rank(text: str, names: Sequence[str]) -> Iterator[dict[str, dict[str, fl
     yield _sides_as_one(ours, lambda n: re.sub(r"[LR]$", "?", n))
     theirs = {u: row for u, row in units.items() if wanted in u.lower()}
     yield _sides_as_one(theirs, lambda u: re.sub(r"(Left|Right)$", "?", u))
+    said = vocabulary.find(text)
+    if said is not None and not said.is_whole and known.issuperset(said.controls):
+        yield {said.name: dict(said.controls)} if said.controls else {}
 
 
 def _sides_as_one(

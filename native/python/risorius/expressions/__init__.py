@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,13 +63,19 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
     """Expressions by name.
 
     Args:
-        path: a TOML file; without it those that come with Risorius, in the order of FILES.
+        path: a TOML file, or a folder of such files, a library; without it those that come with
+            Risorius, in the order of FILES.
 
     Raises:
         ValueError: the file, the expression, what was found and what was expected. OSError.
     """
     if path is None:
         return dict(_own(EDITION))
+    if os.path.isdir(path):
+        files = sorted(Path(path).glob("*.toml"))
+        if not files:
+            raise ArgumentError(f"{os.fspath(path)}: a folder with expressions was expected")
+        return _joined({os.fspath(file): load(file) for file in files})
     return _parsed(toml.read(path), os.fspath(path))
 
 

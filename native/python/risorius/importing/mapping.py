@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import fnmatch
 import os
-import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -25,9 +24,10 @@ from ..base import toml
 from ..base.budget import Budget
 from ..base.given import GivenError, finite, flag, shown
 from ..base.reading import ReadingError
-from ..controls import arkit
+from ..controls import arkit, vocabulary
 from ..controls.regions import expand_sides
 from ..controls.shares import share_of
+from ..controls.vocabulary import ARKIT, Meaning, loose_name, parts_of
 from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
@@ -41,10 +41,11 @@ _KEYS = {
     "shares", "controls", "metadata",
 }  # fmt: skip
 VOWELS = "AIUEO"
+_WITH_UNITS = (ARKIT, "vrm")
+_OLD_BASES = {"arkit units": "vocabulary arkit", "vrm expressions": "vocabulary vrm"}
 _PATTERN_STEPS = 50  # of a budget, to look whether a pattern fits a name
 # Seconds between keys of curves that were keyed; between frames that are added to them; how many.
 _KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
-_SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
 
 
 class MappingError(AnimationFileError):
@@ -85,6 +86,7 @@ class Mapping:
             is left as it is where no curve moves the other one.
         controls: pattern of control names -> what is done to them; the last that fits counts.
         strip: beginnings that curve names may have, and that say nothing.
+        vocabulary: of controls.vocabulary, whose spellings of its names are known as well.
         is_loose: letter case, "_" and Left or L at the end make no difference.
         is_gui: the controls are GUI controls, which a rig's own table turns into raw ones.
         metadata: anything; it travels into the clip.
@@ -96,6 +98,7 @@ class Mapping:
     shares: Table[str, str] = field(default_factory=dict)
     controls: Table[str, Adjustment] = field(default_factory=dict)
     strip: tuple[str, ...] = ()
+    vocabulary: str = ""
     is_loose: bool = True
     is_gui: bool = False
     metadata: Table[str, str] = field(default_factory=dict)
@@ -107,6 +110,7 @@ class Mapping:
     def finder(self) -> Callable[[str], tuple[str, Row] | None]:
         """A function: curve of a source -> (row's name, {control: weight}), or None."""
         exact = {loose_name(key) if self.is_loose else key: key for key in self.rows}
+        exact.pop("", None)  # of a name without letters
         patterns = [key for key in self.rows if "*" in key]
 
         def find(name: str) -> tuple[str, Row] | None:
@@ -125,13 +129,19 @@ class Mapping:
 
         return find
 
-    def _spellings(self, name: str) -> list[str]:
-        """A name as it is; then without a known beginning; then without a mesh's name before it."""
-        out = [name]
-        out += [name[len(p) :] for p in self.strip if name.lower().startswith(p.lower())]
-        if self.is_loose and "." in name and not name.startswith("CTRL_"):
-            out.append(name.rpartition(".")[2])
-        return [spelling for spelling in out if spelling]
+    def _spellings(self, name: str) -> Iterator[str]:
+        """A name as it is; then without a known beginning; then without a mesh's name before it;
+        then as the vocabulary spells it."""
+        yield name
+        for start in self.strip:
+            if name.lower().startswith(start.lower()) and len(name) > len(start):
+                yield name[len(start) :]
+        if self.is_loose:
+            yield from parts_of(name)
+        if self.vocabulary:
+            spelled = vocabulary.vocabulary(self.vocabulary).spelled(name)
+            if spelled is not None:
+                yield spelled
 
     def adjustment(self, control: str) -> Adjustment | None:
         """What is done to a control, or None."""
@@ -260,34 +270,20 @@ def _star(pattern: str, name: str) -> str | None:
     return name[len(before) : len(name) - len(after)]
 
 
-@cache
-def loose_name(name: str) -> str:
-    """A name without letter case and separators, its side as |l or |r at the end.
-
-    eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left are one name.
-    """
-    match = _SIDE.search(name)
-    side = ""
-    if match:
-        name, side = name[: match.start()], "|" + name[-1].lower()
-    plain = re.sub(r"[^a-z0-9*]", "", name.lower())
-    for word in ("left", "right"):
-        if not side and plain.endswith(word) and plain != word:
-            plain, side = plain[: -len(word)], "|" + word[0]
-    return plain + side
-
-
 def _folder() -> Traversable:
     return resources.files(__package__).joinpath("mappings")
 
 
 def mapping_names() -> list[str]:
-    """Names of the mappings that come with Risorius."""
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in _folder().iterdir()
-        if entry.name.endswith(".toml")
-    )
+    """Names of the mappings that come with Risorius: files of their own, and one for each
+    vocabulary."""
+    return sorted({*_files(), *vocabulary.names()})
+
+
+@cache
+def _files() -> frozenset[str]:
+    found = (entry.name for entry in _folder().iterdir())
+    return frozenset(name.removesuffix(".toml") for name in found if name.endswith(".toml"))
 
 
 def mapping_text(name: str) -> str:
@@ -298,7 +294,14 @@ def mapping_text(name: str) -> str:
     """
     if name not in mapping_names():
         raise MappingError(name, f"one of {', '.join(mapping_names())} was expected")
-    return _folder().joinpath(name + ".toml").read_text(encoding="utf-8")
+    if name in _files():
+        return _folder().joinpath(name + ".toml").read_text(encoding="utf-8")
+    of = vocabulary.vocabulary(name)
+    matching = "loose" if of.is_loose else "exact"
+    return (
+        f'# SPDX-License-Identifier: MIT\nname = "{name}"\ndescription = "{of.description}"\n'
+        f'base = "vocabulary {name}"\nmatching = "{matching}"\n'
+    )
 
 
 def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
@@ -380,24 +383,31 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 def _base(table: Table[str, Any], where: str) -> Mapping:
     """The mapping whose rows come first.
 
-    "arkit units" are those of controls/arkit.toml, "vrm expressions" those of controls/vrm.toml and
-    the units beside them.
+    "vocabulary NAME" is one of controls.vocabulary; those that are ARKit's or VRM's have the units
+    with them.
     """
     base = _text(table, "base", where)
     if not base:
         return Mapping("")
-    if base == "arkit units":
-        rows = {unit: dict(row) for unit, row in arkit.mapping().items()}
-        return Mapping("", rows=rows, shares=arkit.shares())
-    if base == "vrm expressions":
-        found = {**arkit.mapping(), **arkit.vrm_mapping()}
-        rows = {name: dict(row) for name, row in found.items()}
-        return Mapping("", rows=rows, shares=arkit.shares())
+    kind, _, of = _OLD_BASES.get(base, base).partition(" ")
+    if kind == "vocabulary" and of in vocabulary.names():
+        meant = vocabulary.vocabulary(of).meanings.values()
+        rows = {m.name: row_of(m) for m in meant}
+        if of in _WITH_UNITS:
+            rows = {unit: dict(row) for unit, row in arkit.mapping().items()} | rows
+        return Mapping("", rows=rows, shares=arkit.shares(), vocabulary=of)
     if base not in mapping_names():
         raise MappingError(
             where, f"base: one of {', '.join(mapping_names())} was expected, found {base}"
         )
     return _built_in(base)
+
+
+def row_of(said: Meaning) -> Row:
+    """The controls of a name's meaning, those of the library's expression where it is one alone."""
+    if said.controls or not said.expression:
+        return dict(said.controls)
+    return dict(expressions.get(said.expression).weights)
 
 
 def _matching(table: Table[str, Any], default: bool, where: str) -> bool:
@@ -564,12 +574,18 @@ def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> 
         known[mapping.name] = hits = {curve for curve in columns if find(curve) is not None}
         if has_vowels and mapping.name != "vrm":
             hits -= {curve for curve in hits if curve.upper() in VOWELS}
-        is_sure = any(len(curve) > 1 for curve in hits) or (has_vowels and mapping.name == "vrm")
+        is_vowels = has_vowels and mapping.name == "vrm"
+        is_sure = is_vowels or not all(map(_is_letter, hits))
         if is_sure and (found := hits.intersection(names)):
             scores.append((-len(found), -len(hits), len(mapping.rows), mapping.name))
-    if len(known["arkit"]) >= arkit.FULL_SET:  # the expressions of VRM repeat the units
+    if len(known[ARKIT]) >= arkit.FULL_SET:  # the expressions of VRM repeat the units
         scores = [score for score in scores if score[-1] != "vrm"]
     return min(scores)[-1] if scores else None
+
+
+def _is_letter(curve: str) -> bool:
+    """Whether a name is a letter alone, which many vocabularies have; kana are MikuMikuDance's."""
+    return len(curve) == 1 and curve.isascii()
 
 
 def single_letters(names: Iterable[str]) -> list[str]:

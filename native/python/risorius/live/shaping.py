@@ -10,9 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.filters import OneEuro
-from ..controls import arkit
+from ..controls import arkit, vocabulary
 from ..controls.shares import share_of
+from ..controls.vocabulary import Meaning
 from ..importing import Mapping, load_mapping
+from ..importing.mapping import row_of
 from ..ranges import Ranges, Remap
 from .frame import Floats, Frame
 
@@ -23,6 +25,7 @@ _LOOK_AT_ONE = math.radians(30.0)  # an eye's turn that a look control at 1 stan
 _STILL = 12.0  # Hz at which a still face is cut with almost no smoothing, to a twentieth with all
 _LONGEST_GAP = 0.5  # seconds without a frame after which smoothing begins anew
 Row = dict[str, float]
+_SENDERS = "vrm"  # the vocabulary of those that send letters
 _ANGLES = {*HEAD, *_EYES, *_IGNORED}
 
 
@@ -80,17 +83,23 @@ def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
     rows = [found[1] if (found := find(name)) else None for name in names]
     units = sum(bool(row) for row in rows)
     looks = any(name.startswith("eyeLook") for name in names)
+    order = (_SENDERS, *vocabulary.leading(names))
     for i, name in enumerate(names):
         if rows[i] is not None:
             continue
         if name in HEAD or name.startswith("CTRL_"):
             rows[i] = {name: 1.0}
-        elif name.lower() in arkit.vrm():
-            full = units >= arkit.FULL_SET
-            rows[i] = {} if full else _through(arkit.vrm()[name.lower()], mapping)
         elif name in _ANGLES:
             rows[i] = _look(name, mapping) if name in _EYES and not looks else {}
+        elif (said := vocabulary.find(name, order)) is not None:
+            repeats = said.vocabulary == _SENDERS and units >= arkit.FULL_SET
+            rows[i] = {} if repeats else _row(said, mapping)
     return rows
+
+
+def _row(said: Meaning, mapping: Mapping) -> Row:
+    """A meaning in controls, its units as the mapping has them."""
+    return _through(dict(said.units), mapping) if said.units else row_of(said)
 
 
 def _through(row: Row, mapping: Mapping) -> Row:
@@ -126,7 +135,7 @@ class Shaper:
 
     Attributes:
         mapping: the Mapping; names that it does not have may be raw controls, angles of the head,
-            expressions of VRM.
+            names of any vocabulary.
         gain: factor on all units, but none on a share of another control: shut lips stay shut.
         head_gain: factor on the head's angles, negative to turn them round.
         gains: factor for single units, by their name as the frame has it, beside `gain`.

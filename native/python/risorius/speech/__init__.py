@@ -9,13 +9,14 @@ sound file --listen--> phonemes with times --viseme_weights--> visemes --control
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ..anim.clip import Clip, Event
 from ..base.errors import ArgumentError
+from ..expressions import Expression
 from . import articulation, gestures, prosody, sheets
 from .audio import RATE, AudioError
 from .listening import Cancel, CancelledError, Heard, Progress, listen
@@ -55,6 +56,7 @@ def speak(
     blinks: bool = True,
     accents: bool = True,
     correctable: bool = False,
+    library: Mapping[str, Expression] | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Clip:
@@ -69,6 +71,7 @@ def speak(
         blinks: whether to blink.
         accents: whether brows and head follow what is stressed.
         correctable: whether the metadata shall hold what `mouth` needs beside the phonemes.
+        library: the face's own expressions by name: its visemes are taken instead of ours.
         progress: called with 0 to 1 now and then.
         cancel: asked now and then; true ends the work with CancelledError.
 
@@ -86,7 +89,7 @@ def speak(
     heard = listen(path, transcript, progress=progress, cancel=cancel)
     clip = animate(
         heard, rate=rate, seed=seed, intensity=intensity, blinks=blinks, accents=accents,
-        correctable=correctable,
+        correctable=correctable, library=library,
     )  # fmt: skip
     metadata = {**clip.metadata, "source": os.path.basename(os.fspath(path))}
     if transcript is not None:
@@ -103,12 +106,13 @@ def animate(
     blinks: bool = True,
     accents: bool = True,
     correctable: bool = False,
+    library: Mapping[str, Expression] | None = None,
 ) -> Clip:
     """The clip of what was heard.
 
     Args:
         heard: of `listen`.
-        rate, seed, intensity, blinks, accents, correctable: as of speak.
+        rate, seed, intensity, blinks, accents, correctable, library: as of speak.
 
     Raises:
         ValueError: a rate or an intensity that makes no sense.
@@ -117,7 +121,7 @@ def animate(
     duration = len(heard.samples) / RATE
     times = np.arange(int(np.ceil((duration + _TAIL) * rate)) + 1) / rate
     opened = prosody.openness(heard.samples)
-    curves = mouth(heard.phonemes, opened, times, intensity)
+    curves = mouth(heard.phonemes, opened, times, intensity, library)
     if blinks:
         begins = gestures.blink_times(heard.phonemes, duration, seed)
         curves.update(gestures.blinks(times, begins))
@@ -140,6 +144,7 @@ def mouth(
     opened: npt.ArrayLike,
     times: npt.NDArray[np.float64],
     intensity: float = 1.0,
+    library: Mapping[str, Expression] | None = None,
 ) -> dict[str, npt.NDArray[np.float64]]:
     """The curves of lips, jaw and tongue alone; what a voice does besides, it does not touch.
 
@@ -148,7 +153,7 @@ def mouth(
         opened: [n], how far vowels open: of prosody.openness, or the thousandths of a correctable
             clip's metadata / 1000.
         times: seconds, ascending in equal steps, [frames].
-        intensity: as of speak.
+        intensity, library: as of speak.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].
@@ -158,7 +163,7 @@ def mouth(
     rest = [Phoneme(begin - 1.0, begin, "SIL"), *phonemes, Phoneme(end, end + 1.0, "SIL")]
     weights = articulation.viseme_weights(rest, times)
     open_far = prosody.openness_at(np.asarray(opened, np.float64), times)
-    return articulation.controls(weights, open_far, intensity)
+    return articulation.controls(weights, open_far, intensity, library)
 
 
 def _check(rate: float, intensity: float) -> None:

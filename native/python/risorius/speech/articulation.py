@@ -9,7 +9,7 @@ mean never closes anything.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ import numpy.typing as npt
 from .. import expressions
 from ..base.easing import smooth_step
 from ..base.filters import gaussian
+from ..expressions import Expression
 from .phones import GLIDES, VISEMES, VOWEL_VISEMES, Phoneme, viseme_of
 
 Curves = npt.NDArray[np.float64]
@@ -132,7 +133,12 @@ def _smoothed(curves: Curves, times: Times) -> Curves:
     return np.ascontiguousarray(smooth[:, reach : reach + len(curves)].T)
 
 
-def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, Curves]:
+def controls(
+    weights: Curves,
+    openness: Curves,
+    intensity: float,
+    library: Mapping[str, Expression] | None = None,
+) -> dict[str, Curves]:
     """Curves of raw controls.
 
     Args:
@@ -140,6 +146,8 @@ def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, C
         openness: float64[frames], 1 where the voice is as loud as it mostly is: scales the jaw of
             the vowels.
         intensity: scales every shape but the closures.
+        library: a face's own visemes by name, which are taken instead of ours; a vowel of its own
+            opens the jaw as a whole.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].
@@ -147,9 +155,10 @@ def controls(weights: Curves, openness: Curves, intensity: float) -> dict[str, C
     curves: dict[str, Curves] = {}
     for column, viseme in enumerate(VISEMES):
         scale = 1.0 if viseme in GATED else intensity
-        for name, weight in expressions.get(viseme).weights.items():
+        own = (library or {}).get(viseme)
+        for name, weight in (own or expressions.get(viseme)).weights.items():
             part = weights[:, column] * weight * scale
-            if viseme in VOWEL_VISEMES and name.endswith(".jawOpen"):
+            if viseme in VOWEL_VISEMES and (own or name.endswith(".jawOpen")):
                 part = part * openness
             curves[name] = curves.get(name, np.zeros(len(weights))) + part
     return {name: _rounded_off(curve) for name, curve in curves.items()}

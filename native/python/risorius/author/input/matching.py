@@ -1,32 +1,62 @@
 # SPDX-License-Identifier: MIT
-"""Which raw control an expression of any naming is, guessed from its name."""
+"""Which raw control or expression a shape of any naming is, guessed from its name."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 
 from ...base import toml
-from ...controls import arkit
+from ...base.words import counted
+from ...controls import arkit, vocabulary
 
-PREFIX = "CTRL_expressions."
+PREFIX = vocabulary.PREFIX
 _SIDES = {"l": "L", "left": "L", "lf": "L", "lt": "L", "r": "R", "right": "R", "rt": "R"}
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """What each shape of a face becomes.
+
+    Attributes:
+        controls: names of raw controls, without prefix, by shape. What nothing knows, or what
+            another shape has taken, is a control of the shape's own name.
+        expressions: name of an expression by shape: visemes and shapes of the whole face, which
+            have a control of their own that nothing but the expression moves.
+        known: how many names are known, by the vocabulary that knows them; "" of words and of
+            what a person said.
+        notes: what is odd about the names, a sentence each.
+    """
+
+    controls: dict[str, list[str]]
+    expressions: dict[str, str]
+    known: dict[str, int]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """Raw controls without prefix and an expression that a name stands for, and how surely: 0 said
+    by a person, 1 of ARKit's or the head's vocabulary, 2 of another, 3 a word, 4 nothing."""
+
+    controls: tuple[str, ...] = ()
+    expression: str = ""
+    rank: int = 4
+    vocabulary: str = ""
 
 
 @cache
 def _table() -> dict[str, list[str]]:
-    """Plain name -> raw controls without prefix; a "*" in them stands for the side."""
+    """Plain word -> raw controls without prefix; a "*" in them stands for the side."""
     text = resources.files(__package__).joinpath("matching.toml").read_text(encoding="utf-8")
     out: dict[str, list[str]] = {}
     for rows in toml.parse(text).values():
         out |= rows
-    for unit, weights in arkit.mapping().items():
-        controls = [name.removeprefix(PREFIX) for name in weights]
-        out[_plain(unit)] = controls
-        for name in controls:
-            out.setdefault(_plain(name), [name])
+    for unit, weights in arkit.mapping().items():  # their parts: Left_MouthSmile
+        out.setdefault(_plain(unit), [name.removeprefix(PREFIX) for name in weights])
     return out
 
 
@@ -49,6 +79,24 @@ def guess(name: str) -> list[str]:
 
     Several mean that the expression is the sum of theirs: both sides of a brow.
     """
+    return list(_guess(name, None).controls)
+
+
+def _guess(name: str, order: Sequence[str] | None) -> _Guess:
+    """Args: order  of vocabularies, see vocabulary.find."""
+    said = vocabulary.find(name, order)
+    words = tuple(_by_words(vocabulary.parts_of(name)[-1]))
+    if said is None:
+        return _Guess(words, "", 3) if words else _Guess()
+    meant = tuple(control.removeprefix(PREFIX) for control in said.controls)
+    is_theirs = said.vocabulary in (vocabulary.ARKIT, *(order or ())[:1])
+    if words and not is_theirs:  # mouthOpen is the jaw's where others are not of that vocabulary
+        return _Guess(words, said.expression if words == meant else "", 3)
+    rank = 1 if is_theirs else 2
+    return _Guess(() if said.is_whole else meant, said.expression, rank, said.vocabulary)
+
+
+def _by_words(name: str) -> list[str]:
     table = _table()
     whole = table.get(_plain(name))
     if whole and not any("*" in control for control in whole):
@@ -62,37 +110,93 @@ def guess(name: str) -> list[str]:
     return list(dict.fromkeys(c.replace("*", s) for c in found for s in sides))
 
 
-def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> dict[str, list[str]]:
-    """The raw controls of each expression; each control belongs to one expression alone.
+def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> Assignment:
+    """The raw controls of each shape; each control belongs to one shape alone.
+
+    What a person said comes first, then names of a vocabulary, then words (mouthOpen for jawOpen);
+    of these what is one control before sums.
 
     Args:
-        names: of the expressions.
+        names: of the shapes.
         edited: what a person says of some of them: a control's name, or several.
-
-    Returns:
-        Names of raw controls, without prefix, by expression. What nothing knows, or what another
-        expression has taken, is a control of the expression's own name.
     """
-    taken: set[str] = set()
-    out: dict[str, list[str]] = {}
-    wanted = {}
-    for name in names:
-        said = edited.get(name)
-        wanted[name] = [said] if isinstance(said, str) else list(said) if said else guess(name)
-    # What a person said comes first, then what is one control, then sums.
-    for name in sorted(wanted, key=lambda n: (n not in edited, len(wanted[n]))):
-        controls = [c.removeprefix(PREFIX) for c in wanted[name]]
-        if not controls or taken & set(controls):
-            controls = [_own(name, taken)]
-        taken |= set(controls)
-        out[name] = controls
-    return {name: out[name] for name in wanted}
+    names = list(names)
+    order = vocabulary.leading(names)
+    guesses = {name: _said(edited[name]) if name in edited else _guess(name, order)
+               for name in names}  # fmt: skip
+    holders: dict[str, str] = {}
+    out = Assignment({name: [] for name in names}, {}, {}, [])
+    for name in sorted(names, key=lambda n: (guesses[n].rank, len(guesses[n].controls))):
+        found = guesses[name]
+        holder = next((holders[c] for c in found.controls if c in holders), None)
+        controls = list(found.controls)
+        if not controls or holder is not None:
+            controls = [_own(name, found.expression, holders)]
+            if found.expression:
+                out.expressions[name] = _free(found.expression, name, out.expressions)
+            elif holder is not None:
+                out.notes.append(_twice(name, holder, found.controls, controls[0]))
+        out.controls[name] = controls
+        holders |= dict.fromkeys(controls, name)
+    for found in guesses.values():
+        if found.rank < _Guess.rank:
+            out.known[found.vocabulary] = out.known.get(found.vocabulary, 0) + 1
+    out.notes.extend(_about(names, guesses))
+    return out
 
 
-def _own(name: str, taken: set[str]) -> str:
-    plain = re.sub(r"[^A-Za-z0-9_]", "_", name) or "expression"
+def _said(value: str | list[str]) -> _Guess:
+    values = [value] if isinstance(value, str) else value
+    return _Guess(tuple(v.removeprefix(PREFIX) for v in values), "", 0)
+
+
+def _twice(name: str, holder: str, controls: Sequence[str], own: str) -> str:
+    meant = " and ".join(controls[:2]) + (" and more" if len(controls) > 2 else "")
+    same = " (their letters are the same)" if name.lower() == holder.lower() else ""
+    return (
+        f"{holder} and {name} both mean {meant}{same}: {name} becomes a control of its own, {own}; "
+        "[controls] may say otherwise"
+    )
+
+
+def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
+    """A sentence where no name is known, or none but visemes and the like."""
+    if not names:
+        return []
+    ranks = [guesses[name].rank for name in names]
+    if min(ranks) == _Guess.rank:
+        some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+        return [
+            f"no name is known of {counted(len(names), 'shape')} ({some}): each becomes a control "
+            "of its own name, which no capture moves; [controls] may say which they are"
+        ]
+    meant = [guesses[name] for name in names if guesses[name].rank < _Guess.rank]
+    if all(found.expression for found in meant):
+        return [
+            f"the {counted(len(meant), 'name')} known are of expressions and visemes: speech and "
+            "expressions move this face, a capture of ARKit's units does not"
+        ]
+    return []
+
+
+def _own(name: str, expression: str, taken: Container[str]) -> str:
+    """A control's name in letters that every reader of DNA files takes."""
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return _numbered(plain if plain.strip("_") else expression or "shape", taken)
+
+
+def _free(expression: str, name: str, taken: Mapping[str, str]) -> str:
+    """The expression's name, or the shape's where another shape is that expression already. Names
+    that differ in case alone are one file on many systems."""
+    used = {found.casefold() for found in taken.values()}
+    if expression.casefold() not in used:
+        return expression
+    return _numbered(re.sub(r"\W", "_", name), used, str.casefold)
+
+
+def _numbered(plain: str, taken: Container[str], as_taken: Callable[[str], str] = str) -> str:
     number, out = 1, plain
-    while out in taken:
+    while as_taken(out) in taken:
         number += 1
         out = f"{plain}{number}"
     return out

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -16,6 +17,7 @@ from ..geometry.skeleton import FARTHEST, Doubles
 from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 
+_LIP = re.compile(r"([UD])[LR]$")
 _LEAST = 1e-6  # of the mesh' size: a vertex that moves less rests
 
 
@@ -134,8 +136,8 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
     Args:
         shapes: the mesh and its expressions.
         controls: raw controls without prefix by expression, as matching.assign gives them. Of
-            several that end in L and R each gets its half, with a soft edge in the middle; others
-            are joined under the expression's own name.
+            several each gets a part, and all of them together are the expression: those of a side
+            or a lip that side or lip, with a soft edge, others an equal share.
     """
     positions = shapes.mesh.positions
     deltas = _by_control(shapes, controls)
@@ -182,19 +184,37 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
 
 
 def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> dict[str, Doubles]:
-    x = shapes.mesh.positions[:, 0] * shapes.left
-    width = 0.06 * np.ptp(x)
-    left = smooth_step(x / width + 0.5)
-    halves = {"L": left, "R": 1 - left}
     out: dict[str, Doubles] = {}
     for expression, delta in shapes.expressions.items():
         named = list(controls.get(expression) or [expression])
-        if sorted(name[-1:] for name in named) == ["L", "R"]:
-            for name in named:
-                out[name] = delta * halves[name[-1]][:, None]
-        else:
-            out[named[0] if len(named) == 1 else expression] = delta
+        parts = _shares(shapes, delta, named)
+        out |= {name: delta * part for name, part in zip(named, parts, strict=True)}
     return out
+
+
+def _shares(shapes: ShapeSet, delta: Doubles, named: Sequence[str]) -> list[Doubles | float]:
+    """float64[V, 1] for each control: its part of an expression; they sum to 1.
+
+    ...L and ...R have their halves; of controls of both lips ...UL and ...DL have the upper and the
+    lower one, which meet in the middle of what moves. The edges are soft.
+    """
+    if len(named) == 1:
+        return [1.0]
+    x, y = shapes.mesh.positions[:, 0] * shapes.left, shapes.mesh.positions[:, 1]
+    width = 0.06 * np.ptp(x)
+    left = smooth_step(x / width + 0.5)
+    moved = (delta**2).sum(axis=1)
+    middle = (moved * y).sum() / max(float(moved.sum()), 1e-300)
+    upper = smooth_step((y - middle) / (width / 3) + 0.5)
+    half = {"L": left, "R": 1 - left, "U": upper, "D": 1 - upper}
+    marks = [(_LIP.findall(name), name[-1:]) for name in named]
+    lips, sides = {lip[0] for lip, _ in marks if lip}, {side for _, side in marks} & {"L", "R"}
+    parts = []
+    for lip, side in marks:
+        part = half[side] if len(sides) == 2 and side in sides else np.ones(len(x))
+        parts.append(part * half[lip[0]] if len(lips) == 2 and lip else part)
+    whole = np.maximum(sum(parts), 1e-12)
+    return [(part / whole)[:, None] for part in parts]
 
 
 def _mesh(source: ObjMesh) -> Mesh:

@@ -20,7 +20,7 @@ from ..geometry.skeleton import Doubles
 from ..levels import LodOptions
 from ..work import RigOptions
 from . import fbx, gltf
-from .matching import assign
+from .matching import Assignment, assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, combined_rows, make_shape_face, take_combined
 
@@ -170,12 +170,12 @@ def _correctives(table: dict[str, Any]) -> CorrectiveOptions:
     return CorrectiveOptions(**{"most": CorrectiveOptions.most if table else 0, **table})
 
 
-def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
+def read_face(spec: Spec) -> tuple[Dna, Assignment, list[str]]:
     """The face of blend shapes that a spec names.
 
     Returns:
-        The face; the raw controls of each expression (empty where the source is a DNA); what is
-        odd about the expressions, a sentence each.
+        The face; what each shape became (nothing where the source is a DNA); what is odd about the
+        shapes and their names, a sentence each.
 
     Raises:
         DnaError: the DNA file cannot be used.
@@ -185,14 +185,14 @@ def read_face(spec: Spec) -> tuple[Dna, dict[str, list[str]], list[str]]:
     folder = spec.path.parent
     if "dna" in spec.source:
         require_regular(folder / spec.source["dna"])
-        return load(folder / spec.source["dna"]), {}, []
+        return load(folder / spec.source["dna"]), Assignment({}, {}, {}, []), []
     shapes = _read_shapes(spec, folder)
     together = take_combined(shapes)
     odd = check_shapes(shapes)
-    controls = assign(shapes.expressions, spec.controls)
-    dna = make_shape_face(shapes, controls)
-    rows = combined_rows(str(spec.path), shapes, together, controls, dna.raw_control_names)
-    return add_correctives(dna, 0, rows) if rows else dna, controls, odd
+    became = assign(shapes.expressions, spec.controls)
+    dna = make_shape_face(shapes, became.controls)
+    rows = combined_rows(str(spec.path), shapes, together, became.controls, dna.raw_control_names)
+    return add_correctives(dna, 0, rows) if rows else dna, became, odd + became.notes
 
 
 def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:

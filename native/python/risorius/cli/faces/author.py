@@ -20,10 +20,13 @@ from ...author.correctives import (
     find_correctives,
 )
 from ...author.fitting import bounded
+from ...author.input.library import about_library, library_files, library_folder
+from ...author.input.matching import Assignment
 from ...author.input.spec import Spec, read_face, read_spec
 from ...author.joint_rig import JointRig, make_joint_rig
 from ...author.work import RigOptions
 from ...base.words import counted
+from ...controls.vocabulary import vocabulary
 from ...files import fileio
 from ..files import CommandLineError, require_suffix, whole_number
 from ..pages.authoring import need_plot, report_page
@@ -80,15 +83,16 @@ def run(args: argparse.Namespace) -> int:
         raise CommandLineError("author: -o OUT.dna was expected")
     spec = read_spec(args.spec)
     options, asked = _options(spec, args), _correctives(spec, args)
-    dna, controls, odd = read_face(spec)
+    dna, became, odd = read_face(spec)
     for sentence in odd:
         print(f"note: {sentence}", flush=True)
     if args.names:
-        print("[controls]")
-        for name, raw in controls.items():
-            print(f"{json.dumps(name)} = {json.dumps(raw[0] if len(raw) == 1 else raw)}")
+        print("\n".join(as_names(became)))
         return 0
     fileio.check_writable(args.out)
+    library = library_files(became, library_folder(args.out))
+    for path in library:
+        fileio.check_writable(path, parents=True)
     if args.report is not None:
         require_suffix(args.report, (".html",), "--report")
         fileio.check_writable(args.report)
@@ -107,11 +111,29 @@ def run(args: argparse.Namespace) -> int:
         rig.dna = correct_again(rig.dna, source, asked, say)
     said = json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out))
     files = {args.out: rig.dna.to_bytes()}
+    files |= library
+    if not args.json:
+        said = "\n".join([said, *about_library(became, library_folder(args.out))])
     if args.report is not None:
         files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
     fileio.write_all(files)  # the page last of what can fail: there is no face without it
     print(said)
     return 0
+
+
+def as_names(became: Assignment) -> list[str]:
+    """The table [controls] as it would be used, and beside it what else a name is."""
+    lines = ["[controls]"]
+    for name, raw in became.controls.items():
+        line = f"{json.dumps(name)} = {json.dumps(raw[0] if len(raw) == 1 else raw)}"
+        expression = became.expressions.get(name)
+        lines.append(f"{line}  # the expression {expression}" if expression else line)
+    known = sum(became.known.values())
+    by = ", ".join(
+        f"{count} of {vocabulary(name).title}" if name else f"{count} by words or [controls]"
+        for name, count in became.known.items()
+    )
+    return [*lines, f"# {known} of {len(became.controls)} names are known{': ' + by if by else ''}"]
 
 
 def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: MIT
+"""Which controls or which expression a name means, in which vocabulary.
+
+One table for each vocabulary lies in vocabularies/, beside ARKit's units (arkit.toml); authoring,
+clips, live faces and typed names ask this module. A file has a title, a description, `strip`
+(beginnings that names may have), `begins` (those that they must have, the usual one first), `ends`
+(endings that they may have), `matching = "exact"` where letter case counts, `controls` (names that
+are raw controls), `same` (names of one meaning) and `names`. A name's meaning is
+
+- a raw control without prefix, or a list of them: "*" stands for both sides, "**" for the four lip
+  quarters, and in a name for a side, L or Left, and then in its meaning as well;
+- "=jawOpen": an ARKit unit;
+- "@aa": an expression of the library, beside controls in a list where they may be taken already;
+- a table of shares of controls or units: a shape of the whole face, with its expression's name;
+- []: nothing that a face's controls do.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
+from typing import Any
+
+from ..base import toml
+from . import arkit
+from .regions import expand_sides
+
+PREFIX = "CTRL_expressions."
+ARKIT = "arkit"
+_ARKIT_STRIP = ("blendShapes.", "blendShape.", "ARKit_", "Face.", "FaceCap_")
+_SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
+_COPY = re.compile(r"\.\d{3}$")  # as Blender numbers what has another's name
+_WORDS = {"L": "Left", "R": "Right"}
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What a name means.
+
+    Attributes:
+        vocabulary: its name, as of `names`.
+        name: as the vocabulary spells it.
+        controls: raw control as a DNA spells it -> weight; empty where the library's expression
+            says it, or nothing does.
+        expression: name of an expression, "" where it is none.
+        is_whole: a shape of the face or a part of it, which is an expression rather than a control.
+        units: ARKit unit -> weight, where the vocabulary says it in units.
+    """
+
+    vocabulary: str
+    name: str
+    controls: Mapping[str, float] = field(default_factory=dict)
+    expression: str = ""
+    is_whole: bool = False
+    units: Mapping[str, float] = field(default_factory=dict)
+
+
+@cache
+def loose_name(name: str) -> str:
+    """A name without letter case and separators, its side as |l or |r at the end.
+
+    eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left are one name.
+    """
+    name = unicodedata.normalize("NFKC", name)
+    match = _SIDE.search(name)
+    side = ""
+    if match:
+        name, side = name[: match.start()], "|" + name[-1].lower()
+    plain = re.sub(r"[^\w*]|_", "", name.lower())
+    for word in ("left", "right"):
+        if not side and plain.endswith(word) and plain != word:
+            plain, side = plain[: -len(word)], "|" + word[0]
+    return plain + side
+
+
+class Vocabulary:
+    """The names that one program or protocol has.
+
+    Attributes:
+        name, title, description: for files, and for people.
+        meanings: name as it is usually spelled -> Meaning.
+        is_loose: letter case, "_" and Left or L at the end make no difference.
+    """
+
+    def __init__(self, name: str, table: Mapping[str, Any]) -> None:
+        self.name, self.title = name, str(table["title"])
+        self.description = str(table["description"])
+        self.is_loose = table.get("matching") != "exact"
+        self._strip = tuple(table.get("strip", ()))
+        self._begins = tuple(table.get("begins", ()))
+        self._ends = tuple(table.get("ends", ()))
+        self.meanings = {m.name: m for m in self._read(table)}
+        for other, one in table.get("same", {}).items():
+            said = self.meanings[one]
+            self.meanings[other] = replace(said, name=other)
+        self._loose: dict[str, str] = {}
+        for spelled in self.meanings:
+            self._loose.setdefault(loose_name(spelled), spelled)
+        self._loose.pop("", None)
+
+    def _read(self, table: Mapping[str, Any]) -> Iterator[Meaning]:
+        first = self._begins[0] if self._begins else ""
+        for own in table.get("controls", ()):
+            for control in expand_sides(own):
+                yield Meaning(self.name, control, {PREFIX + control: 1.0})
+        for name, value in table.get("names", {}).items():
+            for spelled, said in _for_sides(name, value):
+                yield _meaning(self.name, first + spelled, said)
+
+    def spelled(self, name: str, *, loosely: bool = True) -> str | None:
+        """The name as the vocabulary spells it, or None.
+
+        Args:
+            name: with whatever stands before its last dot, its beginnings and its endings.
+            loosely: by its letters as well, where the vocabulary allows it.
+        """
+        for candidate in self._candidates(name):
+            if candidate in self.meanings:
+                return candidate
+            if loosely and self.is_loose and (found := self._loose.get(loose_name(candidate))):
+                return found
+        return None
+
+    def _candidates(self, name: str) -> Iterator[str]:
+        for part in parts_of(name):
+            for end in ("", *self._ends):
+                if not part.endswith(end):
+                    continue
+                whole = part[: len(part) - len(end)]
+                yield whole
+                lower = whole.lower()
+                for start in (*self._strip, *self._begins):
+                    if lower.startswith(start.lower()):
+                        first = self._begins[0] if start in self._begins else ""
+                        yield first + whole[len(start) :]
+
+
+def parts_of(name: str) -> list[str]:
+    """A name as it is; without the number of a copy; what follows a mesh's or figure's name, which
+    ends at the last dot, colon or bar, or at the first double underscore."""
+    name = _COPY.sub("", name)
+    after = re.split(r"[.:|]", name)[-1] if not name.startswith("CTRL_") else name
+    return list(dict.fromkeys(p for p in (name, after, after.partition("__")[2]) if p))
+
+
+def names() -> tuple[str, ...]:
+    """Names of the vocabularies; ARKit first, which others share names with."""
+    return tuple(_all())
+
+
+def vocabulary(name: str) -> Vocabulary:
+    """One of them. Raises: KeyError: it is none of `names`."""
+    return _all()[name]
+
+
+def find(name: str, order: Sequence[str] | None = None) -> Meaning | None:
+    """What a name means; None if no vocabulary knows it.
+
+    Args:
+        name: of a shape or a curve, with whatever stands before its last dot.
+        order: of vocabularies, as `leading` gives it: the first that knows the name decides. None:
+            ARKit's in any spelling, then as a vocabulary spells it, then by its letters.
+    """
+    if order is not None:
+        return _found(name, order, loosely=True)
+    return (
+        _found(name, (ARKIT,), loosely=True)
+        or _found(name, names(), loosely=False)
+        or _found(name, names(), loosely=True)
+    )
+
+
+def _found(name: str, order: Sequence[str], *, loosely: bool) -> Meaning | None:
+    for one in map(vocabulary, order):
+        spelled = one.spelled(name, loosely=loosely)
+        if spelled is not None:
+            return one.meanings[spelled]
+    return None
+
+
+def known(given: Iterable[str]) -> dict[str, int]:
+    """How many of these names each vocabulary knows; those that know none are not in it."""
+    given = list(given)
+    counts = {v.name: sum(v.spelled(n) is not None for n in given) for v in _all().values()}
+    return {name: count for name, count in counts.items() if count}
+
+
+def leading(given: Iterable[str]) -> tuple[str, ...]:
+    """The vocabularies in the order in which names that are together are looked up: the one that
+    knows most of them first, ARKit's before others that know as many."""
+    counts = known(given)
+    return tuple(sorted(counts, key=lambda name: -counts[name]))
+
+
+@cache
+def _all() -> dict[str, Vocabulary]:
+    units = {unit: "=" + unit for unit in arkit.mapping()}
+    table: dict[str, Any] = {"title": "ARKit", "description": "", "names": units}
+    found = {ARKIT: Vocabulary(ARKIT, {**table, "strip": _ARKIT_STRIP})}
+    folder = resources.files(__package__).joinpath("vocabularies")
+    for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        if entry.name.endswith(".toml"):
+            name = entry.name.removesuffix(".toml")
+            found[name] = Vocabulary(name, toml.parse(entry.read_text(encoding="utf-8")))
+    return found
+
+
+def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """A row as it is, or for each side where its name has a *."""
+    if "*" not in name:
+        yield name, value
+        return
+    # eyeClosed* is spelled eyeClosedLeft, Eye_Blink_* is Eye_Blink_L, lipFunneler*B lipFunnelerLB
+    is_word = name[0].isupper() and "_" not in name and name.endswith("*")
+    for side in "LR":
+        yield name.replace("*", _WORDS[side] if is_word else side), _on_side(value, side)
+
+
+def _on_side(value: Any, side: str) -> Any:
+    if isinstance(value, str):
+        word = _WORDS[side]
+        if value.startswith("@"):
+            return value.replace("*", word.lower())
+        return value.replace("*", word if value.startswith("=") else side)
+    if isinstance(value, list):
+        return [_on_side(item, side) for item in value]
+    return {_on_side(key, side): share for key, share in value.items()}
+
+
+def _meaning(vocabulary: str, name: str, value: Any) -> Meaning:
+    if isinstance(value, str):
+        value = [value]
+    is_table = isinstance(value, dict)
+    shares = value if is_table else dict.fromkeys(value, 1.0)
+    expression = next((key[1:] for key in shares if key.startswith("@")), "")
+    controls: dict[str, float] = {}
+    units: dict[str, float] = {}
+    for key, share in shares.items():
+        for part, weight in _controls_of(key, float(share), units).items():
+            controls[part] = controls.get(part, 0.0) + weight
+    is_whole = bool(expression) and (is_table or not controls)
+    return Meaning(vocabulary, name, controls, expression, is_whole, units)
+
+
+def _controls_of(key: str, share: float, units: dict[str, float]) -> dict[str, float]:
+    """Controls of one part of a meaning; the units that it names are added to `units`."""
+    if key.startswith("@"):
+        return {}
+    if not key.startswith("="):
+        return {PREFIX + control: share for control in expand_sides(key)}
+    base = key[1:]
+    named = [base[:-1] + word for word in _WORDS.values()] if base.endswith("*") else [base]
+    out: dict[str, float] = {}
+    for unit in named:
+        units[unit] = units.get(unit, 0.0) + share
+        for control, weight in arkit.mapping()[unit].items():
+            out[control] = out.get(control, 0.0) + share * weight
+    return out

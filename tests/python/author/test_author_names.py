@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: MIT
+"""What the shapes of a head become by their names: controls, and expressions of its own."""
+
+from __future__ import annotations
+
+import command_line
+import face_shapes
+import pytest
+import risorius
+from risorius import expressions
+from risorius.author.input import matching
+from risorius.controls import arkit
+
+PREFIX = "CTRL_expressions."
+
+
+def test_a_name_of_a_vocabulary_wins_over_a_word():
+    found = matching.assign(["mouthOpen", "smile", "jawOpen", "mouthSmile_L"], {})
+    assert found.controls["jawOpen"] == ["jawOpen"]
+    assert found.controls["mouthSmile_L"] == ["mouthCornerPullL"]
+    assert found.controls["mouthOpen"] == ["mouthOpen"]
+    assert found.notes == [
+        "jawOpen and mouthOpen both mean jawOpen: mouthOpen becomes a control of its own, "
+        "mouthOpen; [controls] may say otherwise",
+        "mouthSmile_L and smile both mean mouthCornerPullL and mouthCornerPullR: smile becomes a "
+        "control of its own, smile; [controls] may say otherwise",
+    ]
+
+
+@pytest.mark.parametrize("before", ["", "blendShape1.", "Head|"])
+def test_all_units_are_their_controls(before):
+    spelled = {unit: unit.replace("Left", "_L").replace("Right", "_R") for unit in arkit.mapping()}
+    names = {before + spelled[unit]: row for unit, row in arkit.mapping().items()}
+    found = matching.assign(names, {})
+    assert found.notes == []
+    assert found.known == {"arkit": 52}
+    for name, row in names.items():
+        assert [PREFIX + control for control in found.controls[name]] == list(row)
+
+
+def test_visemes_and_faces_become_expressions():
+    found = matching.assign(["A", "Joy", "Blink", "Blink_L", "Blink_R", "Fcl_MTH_A", "お"], {})
+    assert found.expressions == {
+        "A": "aa",
+        "Joy": "joy",
+        "Blink": "blink",
+        "Fcl_MTH_A": "Fcl_MTH_A",
+        "お": "O",
+    }
+    assert found.controls["Blink_L"] == ["eyeBlinkL"]
+    assert found.controls["お"] == ["O"]  # letters that every reader of DNA files takes
+    assert found.controls["Joy"] == ["Joy"]
+    assert found.notes == []
+    assert matching.assign(["Blink"], {}).controls == {"Blink": ["eyeBlinkL", "eyeBlinkR"]}
+
+
+def test_the_names_of_icts_head_are_all_known():
+    # ARKit's with sides for browInnerUp and cheekPuff, and three of its own
+    units = [u.replace("Left", "_L").replace("Right", "_R") for u in arkit.mapping()]
+    names = [u for u in units if u not in ("browInnerUp", "cheekPuff", "tongueOut")]
+    sided = ("browInnerUp", "cheekPuff", "cheekRaiser", "PupilDilate")
+    names += [f"{name}_{side}" for name in sided for side in "LR"]
+    found = matching.assign(names, {})
+    assert sum(found.known.values()) == len(names) == 57
+    assert found.controls["browInnerUp_L"] == ["browRaiseInL"]
+    assert found.controls["cheekPuff_R"] == ["mouthCheekBlowR"]
+    assert found.controls["PupilDilate_L"] == ["eyePupilWideL"]
+    assert len(found.notes) == 2  # cheekRaiser is cheekSquint
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["jaw_open", "Jaw_Open"], "both mean jawOpen (their letters are the same): Jaw_Open beco"),
+        (["mouthSmileLeft", "Mouth_Smile_L"], "mouthSmileLeft and Mouth_Smile_L both mean mouthCo"),
+        (
+            ["Key 1", "Key 2", "Key 3", "Key 4"],
+            "no name is known of 4 shapes (Key 1, Key 2, Key 3, ...)",
+        ),
+        (
+            ["viseme_aa", "viseme_PP", "hat"],
+            "the 2 names known are of expressions and visemes: speech",
+        ),
+    ],
+)
+def test_odd_names_are_one_sentence(names, words):
+    found = matching.assign(names, {})
+    assert len(found.notes) == 1
+    assert words in found.notes[0]
+    given = [control for controls in found.controls.values() for control in controls]
+    assert len(set(given)) == len(given)
+
+
+@pytest.fixture(scope="module")
+def authored(tmp_path_factory):
+    """The egg with a viseme, a face and a funnel beside ARKit's units, as the command made it."""
+    folder = tmp_path_factory.mktemp("names") / "egg"
+    path = face_shapes.write_all(folder, joints=8, more="rounds = 2\n[lods]\ncount = 1\n")
+    positions, faces = face_shapes.head()
+    lips = face_shapes.bump(positions, 0, -5, 4)[:, None]
+    for name, way in (
+        ("viseme_aa", [0, -1.0, 0]),
+        ("Joy", [0, 1.0, 0]),
+        ("Mouth_Funnel", [0, 0, 1.0]),
+    ):
+        face_shapes.write_obj(folder / "shapes" / f"{name}.obj", positions + lips * way, faces)
+    names = command_line.run("author", path, "--names", text=True)
+    assert names.returncode == 0, names.stderr
+    done = command_line.run("author", path, "-o", folder / "egg.dna", "--exact", text=True)
+    assert done.returncode == 0, done.stderr
+    return folder, names.stdout, done.stdout
+
+
+def test_the_command_tells_what_names_become(authored):
+    folder, names, said = authored
+    assert '"viseme_aa" = "viseme_aa"  # the expression aa' in names
+    assert '"jawOpen" = "jawOpen"\n' in names
+    assert "# 10 of 10 names are known: " in names
+    assert f"{folder / 'egg_expressions'}: 2 expressions of the face itself" in said
+
+
+def test_an_expression_of_the_face_moves_it(authored):
+    folder, _, _ = authored
+    library = expressions.load(folder / "egg_expressions")
+    assert list(library) == ["aa", "joy"]
+    assert (library["aa"].label, library["aa"].group) == (expressions.get("aa").label, "viseme")
+    rig = risorius.Rig(risorius.load(folder / "egg.dna"))
+    vector = expressions.pose_vector(library["joy"], rig.raw_control_names)
+    assert vector.sum() == 1.0
+    assert dict(library["joy"].weights) == {PREFIX + "Joy": 1.0}
+    with pytest.raises(ValueError, match="a folder with expressions was expected"):
+        expressions.load(folder / "shapes")
+
+
+def test_a_unit_of_several_controls_is_what_captures_move(authored):
+    folder, _, _ = authored
+    assert set(arkit.mapping()["mouthFunnel"]) <= set(
+        risorius.load(folder / "egg.dna").raw_control_names
+    )
+
+
+def test_a_place_that_cannot_be_written_is_told_before_the_work(authored):
+    folder, _, _ = authored
+    (folder / "no_expressions").write_text("a file")
+    done = command_line.run("author", folder / "spec.toml", "-o", folder / "no.dna", text=True)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "no_expressions" in done.stderr
+    assert not (folder / "no.dna").exists()
