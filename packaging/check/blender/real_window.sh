@@ -27,15 +27,21 @@ export DISPLAY=:${WINDOW_DISPLAY:-78}
 failed=0
 
 drive() { # drive BLENDER NAME: all steps in one program
-  local blender=$1 out="$top/${2// /-}" user x
+  local blender=$1 out="$top/${2// /-}" user packages x
   rm -rf "$out" && mkdir -p "$out"
   user=$(mktemp -d /tmp/window.XXXXXX)
   # A program in a chroot sees /tmp, and nothing of the project for certain.
   cp "$zip" "$project/packaging/check/blender/window/inside.py" "$user/"
+  espeak-ng -w "$user/voice.wav" "My father bought five big maps of Rome" 2> /dev/null || rm -f "$user/voice.wav"
   cd "$user" || return 1
   export BLENDER_USER_RESOURCES="$user" HOME="$user"
   limited 600 "$blender" --command extension install-file -r user_default -e "$user/$(basename "$zip")" > "$out/install.log" 2>&1 ||
     { printf 'row\t%s: the extension is installed\t0\t1\n' "$2" && return 1; }
+  # Where the extension's own button would put PocketSphinx; a Blender takes the library of its Python.
+  packages=$user/extensions/.user/user_default/risorius/packages
+  for x in "$project"/build/speech/pocketsphinx-*.whl; do
+    [ ! -e "$x" ] || { mkdir -p "$packages" && unzip -q -o "$x" -d "$packages"; }
+  done
   unzip -q -o -j "$zip" 'sample/man.dna' -d "$user" 2> /dev/null || cp "$project/build/sample/man.dna" "$user/"
   Xvfb "$DISPLAY" -screen 0 1440x900x24 > "$out/xvfb.log" 2>&1 &
   x=$!

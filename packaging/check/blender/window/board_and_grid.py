@@ -26,6 +26,8 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.still()
     told = f"{len(handles)} handles and the face are in the view, in pose mode"
     yield told, hand.ask("state")["mode"] == "POSE" and hand.ask("board_in_view", names=handles)
+    travel = hand.ask("least_travel", names=handles)
+    yield f"each handle has at least 40 pixels of travel ({travel:.1f})", travel >= 40.0
     hand.picture("board-added")
     handle = next(name for name in handles if name.lower().split("_")[-1] == "jaw")
     before, box = hand.still(), hand.ask("face_box")

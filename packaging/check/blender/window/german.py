@@ -20,6 +20,8 @@ def german(hand: Hand, _dna: Path) -> Iterator[Check]:
         raise NotThereError("the German window, this Blender has no German words")
     hand.ask("run", code=POSED)
     hand.still()
+    names = hand.ask("state")["layers"]
+    yield f"a new layer has a German name ({names})", names == ["Leises Leben"]
     hand.picture("german-tab")
     for name in hand.see(THERE):
         hand.move(*IN_VIEW)
@@ -38,6 +40,7 @@ LANGUAGE = """
 view_settings = bpy.context.preferences.view
 view_settings.language = {!r}
 view_settings.use_translate_interface = True
+view_settings.use_translate_new_dataname = True
 """
 POSED = f"""
 face()[{SMILE[0]!r}] = 0.8
