@@ -10,7 +10,7 @@
 #   ./packaging/check/blender/real_window.sh OUT BLENDER...     OUT: a folder below /tmp or the project; BLENDER: as
 #                                            packaging/check/blender/blenders.sh printed them
 #       STEPS=slider,... runs some steps only; ZIP= names the extension; WINDOW_DISPLAY= another display;
-#       DOCS=1 puts the pictures of docs/ in place, of the first program (STEPS=start,shot makes them)
+#       DOCS=1 puts the pictures of docs/ in place, of the first program (STEPS=start,shot,board makes them)
 set -uo pipefail
 [ $# -ge 2 ] || { echo "real_window.sh: real_window.sh OUT BLENDER..." >&2 && exit 2; }
 source "$(dirname "$0")/../../setup.sh"
@@ -58,6 +58,7 @@ drive() { # drive BLENDER NAME: all steps in one program
 
 # Picture of OUT, that of docs/images, its width there.
 pictures="first-face first_look 1366
+board-smirk board_primary 1366
 animator-drag animator_drag 1080
 animator-expressions animator_expressions 1080
 animator-shot animator_shot 1080"
