@@ -45,6 +45,9 @@ def test_from_the_front_no_outline_lies_over_the_eyes_and_all_lie_near_the_head(
             )
             assert not over, name
         assert np.all(np.abs(drawn - (low + high) / 2) < room + np.ptp(drawn, axis=0)), name
+    collar, neck = outline(controls, "neck"), controls.data.bones["neck"].head_local
+    assert collar[:, 1].max() < neck.y + 1e-4  # behind it, seen from above, lines cross the mouth
+    assert np.ptp(collar[:, 1]) > 0.3 * np.ptp(collar[:, 0])
     sides = [outline(controls, f"eye_{side}")[:, 0].mean() for side in "LR"]
     assert (sides[0] - sides[1]) * (left[0] - right[0]) > 0  # each on the side of its eye
 

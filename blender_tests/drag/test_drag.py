@@ -320,9 +320,11 @@ def test_a_pin_holds_and_is_saved(rig, dna_file, tmp_path):
     assert max(few, np.linalg.norm(place(rig, held) - was)) < 0.8 * loose
     assert bpy.ops.risorius.pin(mesh=HEAD, vertex=held + 3) == {"FINISHED"}
     assert list(scene.controls(rig)["risorius_pins"]) == [HEAD, held, HEAD, held + 3]
+    assert bpy.ops.risorius.clear_pins.poll()
     for vertex in (held, held + 3):  # and out again
         assert bpy.ops.risorius.pin(mesh=HEAD, vertex=vertex) == {"FINISHED"}
     assert "risorius_pins" not in scene.controls(rig)
+    assert not bpy.ops.risorius.clear_pins.poll()  # grey: none is left
 
 
 def test_keys_are_inserted_on_what_moved_if_auto_key_is_on(rig, dna_file):

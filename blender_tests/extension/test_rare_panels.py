@@ -37,7 +37,7 @@ def test_of_two_faces_the_panel_says_that_none_is_selected(rig, dna_file):
 
 def test_a_face_has_a_hint_until_it_is_dismissed(rig):
     def says():
-        return "pull at the skin" in drawn(bpy.types.RISORIUS_PT_character).text()
+        return "pulls at the skin" in drawn(bpy.types.RISORIUS_PT_character).text()
 
     addons = bpy.context.preferences.addons
     entry = addons.new()  # tests enable the add-on without one

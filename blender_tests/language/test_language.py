@@ -61,6 +61,18 @@ def test_tooltips_of_operators_and_controls_are_translated(german, dna_file):
     assert "Spiegel" in look_up(bpy.ops.risorius.mirror.get_rna_type().description)
 
 
+def test_new_layers_have_german_names_where_blender_gives_new_things_such(german, dna_file):
+    rig = scene.load(dna_file)
+    view = bpy.context.preferences.view
+    for theirs, expected in ((False, ["Idle Life", "Joy"]), (True, ["Leises Leben", "Freude"])):
+        view.use_translate_new_dataname = theirs
+        bpy.ops.risorius.layer_add(kind="IDLE")
+        bpy.ops.risorius.layer_add(kind="EXPRESSION", source="joy")
+        held = scene.controls(rig).risorius_layers
+        assert [y.name for y in held if not y.removed][-2:] == expected
+    view.use_translate_new_dataname = False
+
+
 def test_names_are_not_translated(german, dna_file):
     rig = scene.load(dna_file)
     assert rig.name == "Small_rig"

@@ -155,7 +155,7 @@ class World:
         rig = self._rig()
         self._activate(rig)
         body = bpy.context.scene.objects.get("body") or self._body()
-        if rig["risorius_controls"].constraints and self.random.random() < 0.5:
+        if bpy.ops.risorius.detach_body.poll() and self.random.random() < 0.5:
             bpy.ops.risorius.detach_body()
         else:
             bpy.ops.risorius.attach_body(body=body.name, base="base", fit="NONE")

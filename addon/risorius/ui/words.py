@@ -120,6 +120,12 @@ def say(text: str, **values: object) -> str:
     return local.format(**values) if values else local
 
 
+def name_of_new(text: str) -> str:
+    """The name of something new: in the user's language where Blender gives such names in it."""
+    follow_language()
+    return bpy.app.translations.pgettext_data(text, CONTEXT) or text
+
+
 def of_error(error: Exception) -> str:
     """What an error says; in the user's language where a sentence was given to it."""
     first = error.args[0] if error.args else ""

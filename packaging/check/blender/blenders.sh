@@ -8,7 +8,7 @@
 #   ./packaging/check/blender/blenders.sh [trixie|sid|all] [PREFIX]
 #       makes PREFIX-trixie, PREFIX-sid or both and prints, one a line, the paths of programs to use
 #       as BLENDER=...; puts a wheel for each one's Python into build/dist, which the extension's
-#       zip then holds too. Default: trixie, /opt/risorius-blender
+#       zip then holds too, and PocketSphinx into build/speech. Default: trixie, /opt/risorius-blender
 set -euo pipefail
 suites=${1:-trixie}
 prefix=${2:-/opt/risorius-blender}
@@ -67,6 +67,22 @@ build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetc
       --no-build-isolation --no-deps --no-index -w build/dist ."
 }
 
+fetch_recogniser() { # fetch_recogniser ROOT: PocketSphinx for its Python, PyPI's wheel or compiled there
+  local folder="$project/build/speech" tools="$project/build/tools" version pinned
+  version=$(chroot "$1" python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
+  pinned=$(grep -oE 'pocketsphinx==[0-9.]+' "$project/pyproject.toml")
+  ls "$folder"/pocketsphinx-*-cp"${version/./}"-*.whl > /dev/null 2>&1 && return 0
+  "$python" -m pip download -q --no-deps --only-binary :all: --platform manylinux2014_x86_64 \
+    --python-version "$version" -d "$folder" "$pinned" 2> /dev/null && return 0
+  "$python" -m pip download -q --no-deps --no-binary :all: --no-build-isolation -d "$tools" "$pinned"
+  "$python" -m pip download -q --only-binary :all: --platform any --abi none --python-version "$version" \
+    -d "$tools" cython
+  chroot "$1" sh -ec "
+    /opt/risorius-venv/bin/pip install -q --no-index --find-links '$tools' cython
+    cd '$project' && PATH=/opt/risorius-venv/bin:/usr/bin:/bin /opt/risorius-venv/bin/pip wheel -q \
+      --no-build-isolation --no-deps --no-index -w build/speech '$tools'/${pinned/==/-}.tar.gz"
+}
+
 write_launcher() { # write_launcher ROOT: a program that runs as if Blender were installed here
   cat > "$1/blender.sh" << END
 #!/bin/sh
@@ -80,6 +96,7 @@ for suite in $suites; do
   make_system "$suite" "$root" >&2
   install_blender "$suite" "$root" >&2
   build_wheel_in "$root" >&2
+  fetch_recogniser "$root" >&2 || echo "blenders.sh: no PocketSphinx for $suite: its voice is not checked" >&2
   write_launcher "$root"
   echo "$root/blender.sh"
 done

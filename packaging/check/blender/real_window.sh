@@ -10,7 +10,7 @@
 #   ./packaging/check/blender/real_window.sh OUT BLENDER...     OUT: a folder below /tmp or the project; BLENDER: as
 #                                            packaging/check/blender/blenders.sh printed them
 #       STEPS=slider,... runs some steps only; ZIP= names the extension; WINDOW_DISPLAY= another display;
-#       DOCS=1 puts the pictures of docs/ in place, of the first program (STEPS=start,shot makes them)
+#       DOCS=1 puts the pictures of docs/ in place, of the first program (STEPS=start,shot,board makes them)
 set -uo pipefail
 [ $# -ge 2 ] || { echo "real_window.sh: real_window.sh OUT BLENDER..." >&2 && exit 2; }
 source "$(dirname "$0")/../../setup.sh"
@@ -27,15 +27,21 @@ export DISPLAY=:${WINDOW_DISPLAY:-78}
 failed=0
 
 drive() { # drive BLENDER NAME: all steps in one program
-  local blender=$1 out="$top/${2// /-}" user x
+  local blender=$1 out="$top/${2// /-}" user packages x
   rm -rf "$out" && mkdir -p "$out"
   user=$(mktemp -d /tmp/window.XXXXXX)
   # A program in a chroot sees /tmp, and nothing of the project for certain.
   cp "$zip" "$project/packaging/check/blender/window/inside.py" "$user/"
+  espeak-ng -w "$user/voice.wav" "My father bought five big maps of Rome" 2> /dev/null || rm -f "$user/voice.wav"
   cd "$user" || return 1
   export BLENDER_USER_RESOURCES="$user" HOME="$user"
   limited 600 "$blender" --command extension install-file -r user_default -e "$user/$(basename "$zip")" > "$out/install.log" 2>&1 ||
     { printf 'row\t%s: the extension is installed\t0\t1\n' "$2" && return 1; }
+  # Where the extension's own button would put PocketSphinx; a Blender takes the library of its Python.
+  packages=$user/extensions/.user/user_default/risorius/packages
+  for x in "$project"/build/speech/pocketsphinx-*.whl; do
+    [ ! -e "$x" ] || { mkdir -p "$packages" && unzip -q -o "$x" -d "$packages"; }
+  done
   unzip -q -o -j "$zip" 'sample/man.dna' -d "$user" 2> /dev/null || cp "$project/build/sample/man.dna" "$user/"
   Xvfb "$DISPLAY" -screen 0 1440x900x24 > "$out/xvfb.log" 2>&1 &
   x=$!
@@ -52,6 +58,7 @@ drive() { # drive BLENDER NAME: all steps in one program
 
 # Picture of OUT, that of docs/images, its width there.
 pictures="first-face first_look 1366
+board-smirk board_primary 1366
 animator-drag animator_drag 1080
 animator-expressions animator_expressions 1080
 animator-shot animator_shot 1080"

@@ -40,6 +40,13 @@ def test_a_neck_that_ends_is_below_the_picture_and_high_hair_in_it():
     assert edges(studio.plan(*GIRL[:2], bun))[1] > bun[2]
 
 
+def test_a_head_that_ends_at_the_chin_is_in_the_picture_whole():
+    for end in (-0.1, -0.135, -0.18):  # the last: where eyes are guessed from the box
+        low, high = edges(studio.plan(0.063, (-0.08, -0.1, end), (0.08, 0.1, 0.12)))
+        assert low < end
+        assert high > 0.12
+
+
 def test_it_grows_with_the_head():
     one = studio.plan(*GROWN)
     ten = studio.plan(*[[10 * x for x in v] if isinstance(v, tuple) else 10 * v for v in GROWN])

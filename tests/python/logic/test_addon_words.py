@@ -146,7 +146,7 @@ def sources() -> Iterator[Path]:
     yield ADDON / "scene" / "animation" / "layer_properties.py"
     yield ADDON / "scene" / "animation" / "range_properties.py"
     yield ADDON / "scene" / "speech" / "spoken_properties.py"
-    yield ADDON / "scene" / "character" / "gaze_settings.py"
+    yield ADDON / "scene" / "gaze" / "gaze_settings.py"
 
 
 def sources_of_sentences() -> Iterator[Path]:

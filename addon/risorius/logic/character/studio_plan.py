@@ -21,6 +21,7 @@ _HEIGHT = 0.39  # of the picture at the eyes: head and shoulders
 _HEADROOM = 0.014  # at least, above the hair
 _EDGE = 0.02  # the picture ends so far above the mesh's lower end
 _CHIN = 0.13  # below the eyes, and in any picture
+_NECK = 0.185  # below the eyes: what ends above it has no neck, and is shown whole
 _THIRD = 1.0 / 3.0  # the eyes' place from the upper edge
 _ASIDE = 8.0  # degrees: the camera sees more of the side that the key leaves to the fill
 _ABOVE = 0.045  # the camera's height above the eyes
@@ -122,11 +123,23 @@ def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
     """Height of the picture, and its middle's height over the eyes.
 
     The eyes lie on the upper third, unless hair is higher than that leaves room for. A face that
-    ends at the neck fills the picture to its lower edge.
+    ends at the neck fills the picture to its lower edge; one that ends at the chin is in it whole.
     """
     below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
+    if -low <= _NECK * unit:
+        below = -low + _HEADROOM * unit
     above = max(below * _THIRD / (1.0 - _THIRD), high + _HEADROOM * unit)
     return above + below, (above - below) / 2
+
+
+def has_neck(apart: float, low: float) -> bool:
+    """Whether there is a neck, or more, for the picture's lower edge to cut.
+
+    Args:
+        apart: distance between the eyes.
+        low: height of the lowest point over the eyes.
+    """
+    return -low > _NECK * apart / GROWN
 
 
 def _lamp(row: _Row, unit: float) -> Lamp:

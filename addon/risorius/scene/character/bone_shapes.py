@@ -65,11 +65,16 @@ def _cross() -> list[Line]:
     return [_ring(), *marks]
 
 
-_OCTAGON = [(1, 0.6), (0.6, 1), (-0.6, 1), (-1, 0.6), (-1, -0.6), (-0.6, -1), (0.6, -1), (1, -0.6)]
+def _collar() -> Line:
+    """Two lines around the front of a neck: seen from above, the back would cross the mouth."""
+    outer = [(1.0, 0.0), (1.0, 0.6), (0.6, 1.0), (-0.6, 1.0), (-1.0, 0.6), (-1.0, 0.0)]
+    return outer + [(0.93 * x, 0.93 * y) for x, y in reversed(outer)]
+
+
 # Each is seen in the xy plane; the longest way from the middle is about 1.
 _OUTLINES: dict[str, list[Line]] = {
     "head": [_ring(), _ring(0.94)],
-    "neck": [_OCTAGON],
+    "neck": [_collar()],
     "eye_L": [_lens(), _ring(0.3)],
     "eye_R": [_lens(), _ring(0.3)],
     "eyes": _cross(),

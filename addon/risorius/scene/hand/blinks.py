@@ -98,13 +98,14 @@ def layer_of(controls: ArmatureObject) -> layer_properties.RISORIUS_PG_layer | N
     return next(found, None)
 
 
-def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink) -> None:
+def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> None:
     """Put a blink into the layer of blinks, which counts where it closes the eyes further.
 
     Args:
         rig: the character.
         frame: where it begins.
         blink: its timing.
+        name: of the layer, where it is new.
     """
     controls = parts.controls_there(rig)
     layer = layer_of(controls)
@@ -132,7 +133,7 @@ def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink) -> None:
             curve.keyframe_points.insert(at, value, options={"FAST"})
         curve.update()
     if layer is None:
-        layers.add(controls, "ACTION", "Blinks", action=action, blend="MAXIMUM", extend="NOTHING")
+        layers.add(controls, "ACTION", name, action=action, blend="MAXIMUM", extend="NOTHING")
         layer = layer_of(controls)
     assert layer is not None
     layer.start = action.frame_range[0]

@@ -65,7 +65,8 @@ def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]
     inside = (corners - middle) @ axes
     place = Matrix.Translation(Vector(middle.tolist())) @ turn.to_4x4()
     low, high = inside.min(axis=0), inside.max(axis=0)
-    low[2] = max(low[2], _hem([(_places(item) - middle) @ axes for item in meshes], apart))
+    if studio_plan.has_neck(apart, low[2]):
+        low[2] = max(low[2], _hem([(_places(item) - middle) @ axes for item in meshes], apart))
     return place, apart, low.tolist(), high.tolist()
 
 

@@ -25,11 +25,11 @@ class RISORIUS_PT_animation(FaceOnlyPanel, Panel):
         column.operator(RISORIUS_OT_import_arkit_rig.bl_idname, icon="SHAPEKEY_DATA")
         column.operator(RISORIUS_OT_curves_from_mesh.bl_idname, icon="MESH_DATA")
         column.operator("risorius.learn_range", icon="DRIVER_DISTANCE")
-        column.operator("risorius.speak", icon="SPEAKER")
+        row = column.row(align=True)
+        row.operator("risorius.speak", icon="SPEAKER")
+        if speech_task.lacks_recogniser():  # a click on Speak says it in words
+            row.operator("risorius.install_speech", text="", icon="ERROR")
         column.menu(RISORIUS_MT_expressions.bl_idname, icon="USER")
-        if speech_task.lacks_recogniser():
-            words.write(layout, "Speak from Audio needs the package PocketSphinx (28 MB).", "INFO")
-            layout.operator("risorius.install_speech", icon="IMPORT")
         data = face_controls(context).animation_data
         action = data.action if data is not None else None
         lines = report_of(action)

@@ -175,6 +175,16 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
         "is removed, except actions that you protected or use elsewhere"
     )
 
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        there = (*selected_rigs(context), *selected_rigs(context, every=True))
+        if not any(bake_face.baked(rig) for rig in there):
+            cls.poll_message_set(words.say("No face is baked."))
+            return False
+        return True
+
     def execute(self, context: Context) -> Result:
         faces = selected_rigs(context, self.every)
         back = [rig for rig in faces if bake_face.unbake(context, rig)]

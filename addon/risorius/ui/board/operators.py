@@ -128,7 +128,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         evaluate.bring_up(context, rig)
         if old != kind:
             _take_up(context, rig)
-        self.report({"INFO"}, say("{count} sliders on the face board", count=count))
+        self.report({"INFO"}, say("{count} handles on the face board", count=count))
         return {"FINISHED"}
 
     def _exchange(self, context: Context, rig: ArmatureObject, kind: str) -> int:

@@ -167,25 +167,40 @@ def _draw_marks() -> None:
     first = draw_points(context, shown.points)
     if first is None:
         return
-    scale = context.preferences.system.ui_scale
-    size = round(12 * scale)
-    for row, text in enumerate(shown.lines):
-        blf.size(0, size)
-        blf.enable(0, blf.SHADOW)
-        blf.shadow(0, 3, 0.0, 0.0, 0.0, 0.9)
+    if shown.lines:
+        _write(shown.lines, first, context.preferences.system.ui_scale)
+
+
+def _write(lines: list[str], at: Vector, scale: float) -> None:
+    """Lines beside a place, on a dark board: outlines of bones lie under them."""
+    blf.size(0, round(12 * scale))
+    wide = max(blf.dimensions(0, text)[0] for text in lines)
+    left, top = at.x + 16 * scale, at.y + 24 * scale
+    low, edge = top - (16 * len(lines) + 4) * scale, 6 * scale
+    _board((left - edge, low), (left + wide + edge, top))
+    for row, text in enumerate(lines):
         blf.color(0, 1.0, 1.0, 1.0, 1.0)
-        blf.position(0, first.x + 16 * scale, first.y + (10 - 16 * row) * scale, 0)
+        blf.position(0, left, at.y + (10 - 16 * row) * scale, 0)
         blf.draw(0, text)
-        blf.disable(0, blf.SHADOW)
+
+
+def _board(low: tuple[float, float], high: tuple[float, float]) -> None:
+    corners = [low, (high[0], low[1]), high, (low[0], high[1])]
+    _fill(corners, [(0, 1, 2), (0, 2, 3)], (0.05, 0.05, 0.05, 0.8))
 
 
 def _disc(at: Vector, radius: float, colour: Colour) -> None:
     angles = np.linspace(0.0, 2.0 * np.pi, 21)
     rim = np.stack([at.x + radius * np.cos(angles), at.y + radius * np.sin(angles)], axis=1)
     corners = np.concatenate([[(at.x, at.y)], rim]).astype(np.float32)
-    fan = [(0, i, i + 1) for i in range(1, 21)]
+    _fill(corners.tolist(), [(0, i, i + 1) for i in range(1, 21)], colour)
+
+
+def _fill(
+    corners: list[tuple[float, float]], triangles: list[tuple[int, int, int]], colour: Colour
+) -> None:
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    batch = batch_for_shader(shader, "TRIS", {"pos": corners.tolist()}, indices=fan)
+    batch = batch_for_shader(shader, "TRIS", {"pos": corners}, indices=triangles)
     gpu.state.blend_set("ALPHA")
     shader.bind()
     shader.uniform_float("color", colour)

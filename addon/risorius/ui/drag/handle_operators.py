@@ -70,6 +70,17 @@ class RISORIUS_OT_clear_pins(FaceOperator, Operator):
     bl_idname = "risorius.clear_pins"
     bl_label = "Remove All Pins"
 
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        rig = face_rig(context)
+        counts = pointing.counts_of(runtime.there(rig))
+        if not kept_points.of(rig, kept_points.PINS, counts):
+            cls.poll_message_set(say("This face has no pins."))
+            return False
+        return True
+
     def execute(self, context: Context) -> Result:
         kept_points.put(face_rig(context), kept_points.PINS, [])
         return {"FINISHED"}

@@ -103,6 +103,15 @@ class RISORIUS_OT_detach_body(FaceOperator, Operator):
     bl_idname = "risorius.detach_body"
     bl_label = "Detach from Body"
 
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if rig_placement.body_of(face_controls(context)) is None:
+            cls.poll_message_set(say("This face is attached to no body."))
+            return False
+        return True
+
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
         rig_placement.detach(face_controls(context))

@@ -86,8 +86,8 @@ def _draw_hint(layout: UILayout, context: Context) -> None:
     row = box.row()
     words.show(row, words.say("First Steps"), "LIGHT")
     row.operator("risorius.hide_hints", text="", icon="X")
-    words.write(box, "Take Drag the Face and pull at the skin, or open a region below.")
-    words.write(box, "Key All holds the pose at this frame; Layers and Animation play over it.")
+    words.write(box, "Drag the Face pulls at the skin.")
+    words.write(box, "Key All keeps the pose here.")
 
 
 def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:

@@ -138,7 +138,7 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
         above = self.kind == "LAYER" or tweaks.of(controls) is not None
         for frame in frames:
             if above:
-                blinks.add_to_layer(rig, frame, blink)
+                blinks.add_to_layer(rig, frame, blink, words.name_of_new("Blinks"))
             else:
                 blinks.key(rig, frame, blink, keying.rules_of(context, auto=False, exact=True))
         evaluate.bring_up(context, rig)

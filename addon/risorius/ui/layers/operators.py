@@ -11,7 +11,7 @@ from ...scene.expressions import assets
 from ...scene.frame import evaluate
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_controls, face_rig
-from ..words import say
+from ..words import name_of_new, say
 
 
 class LayerOperator(FaceOperator):
@@ -61,10 +61,13 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
             if self.source not in known:
                 self.report({"ERROR"}, say("There is no expression {name}.", name=self.source))
                 return {"CANCELLED"}
-            label, when = known[self.source].label, {"start": frame, "extend": "HOLD_FORWARD"}
+            label, when = (
+                name_of_new(known[self.source].label),
+                {"start": frame, "extend": "HOLD_FORWARD"},
+            )
             layers.add(controls, "EXPRESSION", label, expression=self.source, **when)
         else:
-            layers.add(controls, "IDLE", "Idle Life", start=frame, blend="MAXIMUM")
+            layers.add(controls, "IDLE", name_of_new("Idle Life"), start=frame, blend="MAXIMUM")
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 

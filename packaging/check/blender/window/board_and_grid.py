@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from common import JAW, Check, clear, look_at_face, open_section, ready_tab, scroll, slider
+from common import JAW, SMILE, Check, clear, look_at_face, open_section, ready_tab, scroll, slider
 from hand import WIDTH, Hand, difference
 
 HANDLES = """[b.name for b in rig()["risorius_controls"].data.bones if b.get("risorius_board")
@@ -26,7 +26,10 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.still()
     told = f"{len(handles)} handles and the face are in the view, in pose mode"
     yield told, hand.ask("state")["mode"] == "POSE" and hand.ask("board_in_view", names=handles)
+    travel = hand.ask("least_travel", names=handles)
+    yield f"each handle has at least 40 pixels of travel ({travel:.1f})", travel >= 40.0
     hand.picture("board-added")
+    yield from _smirk(hand)
     handle = next(name for name in handles if name.lower().split("_")[-1] == "jaw")
     before, box = hand.still(), hand.ask("face_box")
     at = hand.ask("bone_at", bone=handle)
@@ -59,6 +62,22 @@ def board(hand: Hand, _dna: Path) -> Iterator[Check]:
     yield "removed, the sliders keep what it gave", abs(slider(hand) - led) < 0.01
     hand.ask("run", code="bpy.ops.object.mode_set(mode='OBJECT')")
     clear(hand)
+
+
+def _smirk(hand: Hand) -> Iterator[Check]:
+    """One corner of the mouth and one brow up, by their handles."""
+    for handle, way in (("face_L_mouth_corner", (14, -26)), ("face_L_brow_outer", (0, -40))):
+        at = hand.ask("bone_at", bone=handle)
+        hand.click(*at)
+        hand.move(at[0] + 2, at[1])
+        hand.key("g")
+        hand.go((at[0] + 2, at[1]), (at[0] + 2 + way[0], at[1] + way[1]))
+        hand.do("click", 1)
+        hand.wait("the move has ended", lambda: not hand.ask("is_modal"))
+    pulled = hand.ask("given_by_board", control=SMILE[0])
+    yield f"a smirk by two handles ({pulled:.2f})", pulled > 0.1
+    ready_tab(hand)
+    hand.picture("board-smirk")
 
 
 HEIGHT_OF_NOTHING = 500  # in the view, where no face lies

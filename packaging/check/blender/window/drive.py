@@ -43,7 +43,8 @@ from menus import name_file
 from posing_tasks import gaze, smirk, two_seconds
 from shot import shot
 from skin import drag_in_views, drag_skin
-from take_tasks import capture, voice
+from take_tasks import capture
+from voice import voice
 
 
 def start(hand: Hand, _dna: Path) -> Iterator[Check]:

@@ -184,10 +184,30 @@ def own_head(hand: Hand, _dna: Path) -> Iterator[Check]:
     hand.still()
     hand.picture("own-head")
     yield "Make Rig from Shape Keys: a face of one's own", path.exists()
-    hand.ask("run", code=ONE + "bpy.data.objects.remove(bpy.data.objects['Own Head'])")
+    hand.ask(
+        "run", code=NOT_THE_FIRST + "bpy.app.driver_namespace['before'] = set(bpy.data.objects)"
+    )
+    search(hand, "Studio", "RISORIUS_OT_add_studio")
+    low, high = hand.see(OWN_IN_CAMERA)
+    yield (
+        f"its studio shows all of a head without a neck ({low:.2f} to {high:.2f})",
+        0 < low < high < 1,
+    )
+    hand.ask("run", code=NO_STUDIO + ONE + "bpy.data.objects.remove(bpy.data.objects['Own Head'])")
     clear(hand)
 
 
+NOT_THE_FIRST = """
+own = next(o["risorius_controls"] for o in bpy.data.objects
+           if "risorius_controls" in o and o.name != "Sample_rig")
+for item in bpy.context.view_layer.objects:
+    item.select_set(item == own)
+bpy.context.view_layer.objects.active = own
+"""
+OWN_IN_CAMERA = """(lambda ys: [min(ys), max(ys)])([world_to_camera_view(bpy.context.scene,
+next(o for o in bpy.data.objects if o.type == "CAMERA" and "studio" in o.name),
+m.matrix_world @ Vector(c))[1] for m in bpy.data.objects if m.type == "MESH" and "dna_mesh" in m
+and m["risorius_rig"]["risorius_controls"] == bpy.context.active_object for c in m.bound_box])"""
 HEAD = """
 mesh = bpy.data.meshes.new("Own Head")
 turns, rows = 24, 16

@@ -280,6 +280,23 @@ def board_in_view(names):
     return all(inside)
 
 
+def least_travel(names):
+    """Pixels on the screen from rest to the end of the shortest way of these handles."""
+    controls, found = rig()["risorius_controls"], []
+    for bone in (controls.pose.bones[n] for n in names):
+        limit = next((c for c in bone.constraints if c.type == "LIMIT_LOCATION"), None)
+        if limit is None:
+            continue
+        rest = controls.matrix_world @ bone.bone.matrix_local
+        start = np.array(on_screen(rest.translation))
+        for axis in "xyz":
+            ends = [getattr(limit, f"{end}_{axis}") for end in ("min", "max")]
+            ways = [Vector([e if a == axis else 0.0 for a in "xyz"]) for e in ends if abs(e) > 1e-9]
+            if ways:
+                found.append(max(np.linalg.norm(on_screen(rest @ w) - start) for w in ways))
+    return float(min(found))
+
+
 def bone_in_world(name):
     """The middle of a bone of the controls."""
     controls = rig()["risorius_controls"]
@@ -298,10 +315,15 @@ def browser_region(kind):
     return rectangle(next(r for r in area.regions if r.type == kind))
 
 
+def timeline():
+    """The drawing region of the timeline."""
+    area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
+    return next(r for r in area.regions if r.type == "WINDOW")
+
+
 def timeline_at(frame):
     """Where on the screen a frame is in the timeline's ruler."""
-    area = next(a for a in window().screen.areas if a.type == "DOPESHEET_EDITOR")
-    region = next(r for r in area.regions if r.type == "WINDOW")
+    region = timeline()
     x, _y = region.view2d.view_to_region(frame, 0, clip=False)
     left, top, _width, _height = rectangle(region)
     return [left + x, top + 10]

@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""An animator's tasks, by a hand: a capture with a layer and a tweak over it, a voice."""
+"""An animator's task, by a hand: a capture with a layer and a tweak over it."""
 
 from __future__ import annotations
 
 import math
-import wave
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 from common import (
     Check,
-    NotThereError,
     clear,
     look_at_face,
     need_section,
@@ -138,39 +135,3 @@ data = rig()["risorius_controls"].animation_data
 if data and data.action:
     bpy.data.actions.remove(data.action)
 """
-
-
-def voice(hand: Hand, _dna: Path) -> Iterator[Check]:
-    """Speak from Audio: what lacks is said before anything is chosen; then it speaks."""
-    clear(hand)
-    look_at_face(hand)
-    ready_tab(hand)
-    lacks = not hand.see("module('scene.animation.speech_task').has_recogniser()")
-    if lacks:
-        search(hand, "Speak from Audio")
-        hand.picture("voice-lacks")
-        stayed = "FILE_BROWSER" not in hand.ask("state")["areas"]
-        yield "without PocketSphinx the file browser stays shut, a menu says so", stayed
-        hand.key("Escape")
-        raise NotThereError("a voice and a viseme that is corrected: PocketSphinx is not installed")
-    path = hand.user / "voice.wav"
-    if not path.exists():
-        write_tone(path)
-    search(hand, "Speak from Audio")
-    name_file(hand, path)
-    hand.wait("the view is back", lambda: "VIEW_3D" in hand.ask("state")["areas"])
-    hand.wait("keys", lambda: hand.ask("keyed_frames"))
-    yield "keys of the voice are seen", hand.ask("seen_keys") == hand.ask("keyed_frames")
-    hand.picture("voice")
-    hand.ask("run", code=REMOVE_ACTION)
-    clear(hand)
-
-
-def write_tone(path: Path) -> None:
-    """A second of sound that is no speech."""
-    at = np.arange(16000) / 16000.0
-    with wave.open(str(path), "wb") as out:
-        out.setnchannels(1)
-        out.setsampwidth(2)
-        out.setframerate(16000)
-        out.writeframes((np.sin(at * 900.0) * 9000).astype("<i2").tobytes())
