@@ -154,6 +154,17 @@ def test_joints_alone_and_as_many_levels_as_asked_for(head, tmp_path):
     assert sizes[0] == 506 > sizes[1] > sizes[2]
 
 
+def test_visemes_are_a_library_beside_the_face(head, tmp_path):
+    spoken = head.shape_key_add(name="viseme_aa")
+    spoken.data[30].co.z -= 0.01
+    assert make(tmp_path / "egg.dna", joints=5) == {"FINISHED"}
+    library = risorius.expressions.load(tmp_path / "egg_expressions")
+    assert {name: dict(item.weights) for name, item in library.items()} == {
+        "aa": {"CTRL_expressions.viseme_aa": 1.0}
+    }
+    assert "CTRL_expressions.viseme_aa" in risorius.load(tmp_path / "egg.dna").raw_control_names
+
+
 def test_a_mesh_without_keys_and_a_face_are_refused(head, dna_file, tmp_path):
     for key in list(head.data.shape_keys.key_blocks):
         head.shape_key_remove(key)

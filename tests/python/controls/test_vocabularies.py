@@ -51,6 +51,7 @@ def test_every_name_of_a_program_is_known(kind):
     mapping = importing.load_mapping(importing.best_mapping(names) or "")
     find = mapping.finder()
     assert [name for name in names if find(name) is None] == []
+    assert importing.mapping_title(mapping.name) == vocabulary.vocabulary(mapping.name).title
 
 
 def test_meanings_are_controls_and_expressions_that_there_are():

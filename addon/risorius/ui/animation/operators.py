@@ -78,11 +78,11 @@ def _kinds() -> list[Item]:
 
 @session.cached(("unregister",))
 def _mappings() -> list[Item]:
-    names = native.part("importing").mapping_names()
+    importing = native.part("importing")
     return [
         ("AUTO", "Automatic", "The one that knows the file's names"),
         ("FILE", "File", "A mapping of your own, a TOML file"),
-        *((n, n.replace("_", " ").title(), "") for n in names),
+        *((name, importing.mapping_title(name), "") for name in importing.mapping_names()),
     ]
 
 

@@ -17,6 +17,7 @@ from .mapping import (
     load_mapping,
     mapping_names,
     mapping_text,
+    mapping_title,
 )
 from .ranges import ANGLE_UNITS
 from .reading import KINDS, ROTATIONS, Imported, import_curves, import_file, read
@@ -42,6 +43,7 @@ __all__ = [
     "load_mapping",
     "mapping_names",
     "mapping_text",
+    "mapping_title",
     "process",
     "read",
     "write_text",

@@ -286,6 +286,13 @@ def _files() -> frozenset[str]:
     return frozenset(name.removesuffix(".toml") for name in found if name.endswith(".toml"))
 
 
+def mapping_title(name: str) -> str:
+    """What people call a mapping that comes with Risorius: its vocabulary's title, or its name."""
+    if name in vocabulary.names():
+        return vocabulary.vocabulary(name).title
+    return name.replace("_", " ").title()
+
+
 def mapping_text(name: str) -> str:
     """The TOML of a mapping that comes with Risorius, to be saved and edited.
 
