@@ -104,7 +104,8 @@ def _markers(hand: Hand) -> Iterator[Check]:
     sounds = hand.see(SOUNDS)
     markers = hand.wait("markers", lambda: hand.see(MARKERS))
     yield f"Markers: {len(markers)} of {len(sounds)} sounds", len(markers) == len(sounds)
-    place = len(markers) // 2
+    # The longest: one that is moved past its neighbour stays beside it.
+    place = max(range(1, len(sounds) - 1), key=lambda i: sounds[i][3])
     name, frame = markers[place]
     left, top = hand.ask("timeline_at", frame=frame)
     low = hand.see("rectangle(timeline())[1] + rectangle(timeline())[3] - 14")
