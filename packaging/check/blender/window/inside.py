@@ -287,7 +287,9 @@ def least_travel(names):
         limit = next((c for c in bone.constraints if c.type == "LIMIT_LOCATION"), None)
         if limit is None:
             continue
-        rest = controls.matrix_world @ bone.bone.matrix_local
+        board = bone.parent  # it is scaled, and its handles with it
+        held = board.matrix @ board.bone.matrix_local.inverted() if board else Matrix()
+        rest = controls.matrix_world @ held @ bone.bone.matrix_local
         start = np.array(on_screen(rest.translation))
         for axis in "xyz":
             ends = [getattr(limit, f"{end}_{axis}") for end in ("min", "max")]
