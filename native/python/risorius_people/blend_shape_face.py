@@ -21,13 +21,13 @@ from risorius.author.geometry.polygon_mesh import polygon_mesh, vertex_normals
 from . import expressions as ex
 from . import wrinkles
 from .body import JOINTS, NECK_CUT, NECK_SLOPE, REACH, Body
+from .clothes import shirt
 from .controls import gui_table
 from .eyes import eye_parts, with_eyeballs
+from .mouth.teeth import mouth_parts
+from .mouth.tongue import over_lip
 from .paint.layout import packed
 from .part import Part
-from .parts.clothes import shirt
-from .parts.teeth import mouth_parts
-from .parts.tongue import over_lip
 from .people import MAN, Person
 from .polygons import (
     Floats,

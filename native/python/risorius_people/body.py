@@ -10,9 +10,9 @@ from risorius.author.geometry.rigid import rigid_way
 from risorius.base.easing import smooth_step
 
 from . import expressions as ex
+from .clothes import collar_heights
 from .eyes import Eyes, with_eyeballs
-from .parts.clothes import collar_heights
-from .parts.lips import Mouth, rims, sealed
+from .mouth.lips import Mouth, rims, sealed
 from .people import MAN, Person
 from .polygons import Floats, Ints
 from .proportions import Proportions

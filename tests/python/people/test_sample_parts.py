@@ -7,10 +7,10 @@ import risorius
 import sample_people
 from risorius.author.geometry import rigid
 from risorius.author.geometry.polygon_mesh import polygon_mesh
-from risorius_people import askew, build, people, proportions, source
+from risorius_people import askew, build, clothes, people, proportions, source
 from risorius_people.eyes import with_eyeballs
+from risorius_people.mouth import lips, teeth, tongue
 from risorius_people.paint.layout import islands
-from risorius_people.parts import clothes, lips, teeth, tongue
 from risorius_people.polygons import edges_of
 
 MM = 0.01  # of the data's decimetres

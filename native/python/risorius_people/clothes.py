@@ -10,17 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..part import Part
-from ..polygons import (
-    Floats,
-    Operator,
-    Polygons,
-    clip_below,
-    compact_uvs,
-    edges_of,
-    subdivide,
-)
-from ..source import BaseMesh
+from .part import Part
+from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, edges_of, subdivide
+from .source import BaseMesh
 
 GROUP = "helper-tights"
 # Where the collar stands: its height in the middle, neither in front nor behind; how much lower it
