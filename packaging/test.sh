@@ -151,7 +151,7 @@ some() { # some NAME...: the paths of these files
 # files) in an older and a newer Blender. The lane that ends first takes the one, the next what is left.
 run_subsets() {
   local subset version other
-  subset=$(some extension controls frames past life_scenes)
+  subset=$(some extension controls frames past scenes)
   zip=$(ls "$project"/build/dist/risorius-*.zip)
   for version in 4.2.23 5.0.1; do
     mkdir "$logs/subset-$version" 2> /dev/null || continue
