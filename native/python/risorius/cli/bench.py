@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ import numpy as np
 import risorius
 from risorius.base.errors import RisoriusError
 from risorius.base.npz import DAMAGED, hold_arrays
+from risorius.base.reading import MESH, read_file
 
 from .files import InputError
 
@@ -84,9 +86,9 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
 
 
 def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
-    with open(source, "rb") as opened:
-        hold_arrays(opened)
-        return _write_frames(source, opened, raw_count, folder)
+    opened = io.BytesIO(read_file(source, MESH))  # a pipe cannot be searched for a directory
+    hold_arrays(opened)
+    return _write_frames(source, opened, raw_count, folder)
 
 
 def _write_frames(source: Path, opened: BinaryIO, raw_count: int, folder: Path) -> list[str]:
