@@ -67,6 +67,11 @@ class Runtime:
     chains: dict[int, Chain] = field(default_factory=dict)
     board: str = COMPLETE
 
+    @cached_property
+    def mesh_count(self) -> int:
+        """Meshes of the file; `dna.meshes` makes an object of each at every look."""
+        return len(self.dna.meshes)
+
     def chain(self, joint: int) -> Chain:
         """The joints from the root to one, read when first asked for."""
         if joint not in self.chains:
@@ -246,7 +251,7 @@ def dna_mesh(live: Runtime, item: MeshObject) -> native.Mesh | None:
         item: one of `parts.meshes_of`.
     """
     number = saved.whole(item, parts.MESH, -1)
-    return live.dna.meshes[number] if 0 <= number < len(live.dna.meshes) else None
+    return live.dna.meshes[number] if 0 <= number < live.mesh_count else None
 
 
 def unit_of(rig: ArmatureObject) -> float:

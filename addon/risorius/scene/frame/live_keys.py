@@ -41,9 +41,10 @@ def write(
     block = meshes.live_block(item)
     if key is None or block is None or item.mode == "EDIT":
         return
-    if runtime.dna_mesh(live, item) is None:
+    number = saved.whole(item, parts.MESH, -1)
+    if not 0 <= number < live.mesh_count:
         return  # the data in the .blend is another file's
-    morph = live.morph(item[parts.MESH])
+    morph = live.morph(number)
     if morph.vertex_count != len(block.points):
         return  # the user changed the topology
     if parts.REAL in key:
