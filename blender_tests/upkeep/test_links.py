@@ -285,7 +285,10 @@ def test_objects_linked_without_their_collection(library, dna_file):
 
 
 @pytest.mark.parametrize("shapes", ["DRIVEN", "LOCAL"])
-def test_every_operator_does_its_work_on_an_override_or_says_why_not(library, dna_file, shapes):
+def test_every_operator_does_its_work_on_an_override_or_says_why_not(
+    library, dna_file, shapes, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)  # an export without a folder writes here
     _link(library[0])
     rig = _override(shapes)
     name = rig.name
