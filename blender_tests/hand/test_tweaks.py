@@ -231,7 +231,7 @@ def seen(rig, frame):
 
 
 def turn(rig, name):
-    """Move a control bone as a hand does; returns the property and what it stands at."""
+    """Move a control bone without a key; returns the property and its new value."""
     bone, (channel, value) = pose_bone(rig, name), BONES[name]
     if channel == "rotation_euler":
         bone.rotation_mode = "XYZ"

@@ -110,7 +110,7 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   rig::JointGroup group;
   group.row_count = *rows;
   std::vector<std::uint16_t>& outputs = out.joint_outputs;
-  // A long group has whole vectors of rows to itself; nothing places what is behind its last row.
+  // The rows of a long group fill whole vectors. Rows added for that have no place in a pose.
   const auto fill = [&] {
     if (*rows < simd::kWidest) return;
     outputs.resize(simd::rounded_up(outputs.size()), g.output_indices[0]);

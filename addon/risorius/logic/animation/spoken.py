@@ -201,7 +201,7 @@ def respelled(
         end: of the whole.
 
     Raises:
-        SpokenError: so many phonemes do not fit into that time.
+        SpokenError: the phonemes do not fit into the time of the word.
     """
     where = word_of(sounds, place) or range(place, place + 1)
     begin, until = sounds[where[0]].begin, end_of(sounds, where[-1], end)

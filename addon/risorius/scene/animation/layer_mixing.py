@@ -154,7 +154,7 @@ def mix(
 
 
 def _numbers(bones: Bones) -> NDArray[np.float32]:
-    """float32[BONES]: what the mixer has after the sliders."""
+    """float32[BONES]: angles and target of the control bones, in the order of the mixer."""
     found: list[float] = []
     for name, group in clip_logic.TURNS.items():
         turn = bones.turns.get(name)

@@ -295,7 +295,7 @@ def _note_key(stand: tweaks.Stand, shown: tweaks.Stand, curve: bpy.types.FCurve)
 def _take_all(
     controls: ArmatureObject, tweak: tweaks.Tweak, hands: list[_Hand], frame: float
 ) -> None:
-    """Take keys of several frames, the current one last: it is what the controls stand at."""
+    """Take keys of several frames, the current one last: the controls keep its values."""
     with tweaks.curves_so_far(controls) as old:
         for hand in hands:
             _take(controls, hand, old)
@@ -308,7 +308,7 @@ def _take_all(
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
     """The curves of an action that a tweak takes the place of: of sliders, handles and bones.
 
-    Of the bones all channels, also those that move nothing, which Blender keys with the others.
+    All channels of the bones belong to it: Blender also keys channels that the face does not use.
     """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}

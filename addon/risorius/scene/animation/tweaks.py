@@ -332,7 +332,7 @@ def is_mixed(controls: ArmatureObject) -> bool:
 
 
 def now(controls: ArmatureObject) -> Stand:
-    """What all that a tweak takes stands at. Args: controls  the original or evaluated armature."""
+    """The values of all that a tweak takes. Args: controls  the original or evaluated armature."""
     face, rig = controls.pose.bones[parts.FACE], parts.rig_of(controls.original)
     found = Stand({n: float(v) for n, v in face.items() if isinstance(v, float)})
     if rig is not None:
@@ -380,7 +380,7 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 
 
 def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
-    """What the controls stand at without the tweak.
+    """The values of the controls without the tweak.
 
     Beside NLA strips Blender itself is asked, in a graph of its own.
 

@@ -124,8 +124,8 @@ def identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
 def shown_at(controls: ArmatureObject, frame: float) -> Iterator[ArmatureObject]:
     """A control armature as its keys, strips and drivers show it at a frame.
 
-    What nothing moves stands as it stands now. Blender brings the original to what the animation
-    shows, as any evaluation does: its caller knows what its user moved, and gives it back.
+    A property without animation keeps its present value. Blender writes the animated values to the
+    original too, as in any evaluation. The caller has to give the user's own edits back.
 
     Args:
         controls: the control armature.

@@ -243,6 +243,17 @@ def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
             raise plans.PlanError(told("The file cannot be evaluated.")) from error
 
 
+def mesh_number(live: Runtime, item: MeshObject) -> int | None:
+    """The index of the file's mesh that an object shows, or None where the file has no such mesh.
+
+    Args:
+        live: the Runtime of the character.
+        item: one of `parts.meshes_of`.
+    """
+    number = saved.whole(item, parts.MESH, -1)
+    return number if 0 <= number < live.mesh_count else None
+
+
 def dna_mesh(live: Runtime, item: MeshObject) -> native.Mesh | None:
     """The mesh of the file that an object shows, or None where the file has no such mesh.
 
@@ -250,8 +261,8 @@ def dna_mesh(live: Runtime, item: MeshObject) -> native.Mesh | None:
         live: the Runtime of the character.
         item: one of `parts.meshes_of`.
     """
-    number = saved.whole(item, parts.MESH, -1)
-    return live.dna.meshes[number] if 0 <= number < live.mesh_count else None
+    number = mesh_number(live, item)
+    return None if number is None else live.dna.meshes[number]
 
 
 def unit_of(rig: ArmatureObject) -> float:

@@ -41,8 +41,8 @@ def write(
     block = meshes.live_block(item)
     if key is None or block is None or item.mode == "EDIT":
         return
-    number = saved.whole(item, parts.MESH, -1)
-    if not 0 <= number < live.mesh_count:
+    number = runtime.mesh_number(live, item)
+    if number is None:
         return  # the data in the .blend is another file's
     morph = live.morph(number)
     if morph.vertex_count != len(block.points):

@@ -172,12 +172,9 @@ class RISORIUS_OT_frame_board(FaceOperator, Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        if not super().poll(context):
-            return False
-        if not _has_board(context):
-            cls.poll_message_set(say("This face has no board: add one first."))
-            return False
-        return True
+        return super().poll(context) and _needs_board(
+            cls, context, say("This face has no board: add one first.")
+        )
 
     def execute(self, context: Context) -> Result:
         framing.show_with_board(context, face_rig(context))
@@ -192,12 +189,7 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        if not super().poll(context):
-            return False
-        if not _has_board(context):
-            cls.poll_message_set(say("This face has no board."))
-            return False
-        return True
+        return super().poll(context) and _needs_board(cls, context, say("This face has no board."))
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
@@ -207,6 +199,14 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
         shown_keys.show_some(face_controls(context))
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
+
+
+def _needs_board(cls: type[Operator], context: Context, missing: str) -> bool:
+    """Whether the face has a board; else the tooltip of the operator says what is missing."""
+    if _has_board(context):
+        return True
+    cls.poll_message_set(missing)
+    return False
 
 
 def _has_board(context: Context) -> bool:
