@@ -47,7 +47,7 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     refuse_other_kinds(path, "a binary FBX", (signatures.FBX.code,))
     if not is_fbx(data):
         raise ShapeFileError(f"{path}: a binary FBX was expected")
-    scene = read_scene(Parser(data, str(path), Budget.of(len(data)), _SKIPPED))
+    scene = read_scene(Parser(data, str(path), Budget.of(len(data), str(path)), _SKIPPED))
     number = _choose(scene, path, mesh)
     geometry = scene.objects[number]
     turn = _axes(scene) @ _to_world(scene, number)

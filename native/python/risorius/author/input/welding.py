@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""Vertices that a file has several times, for seams of the texture or of the normals, made one.
+
+Such vertices lie on open edges, at one place, and move alike in all shapes. Texture coordinates
+have corners of their own and stay as they are.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..geometry.skeleton import Doubles, Ints
+from .obj import ObjMesh
+
+_SAME = 1e-6  # of the mesh' size
+_ROUNDINGS = 4  # of float32, at the farthest vertex from the origin
+
+
+def welded(mesh: ObjMesh, deltas: Sequence[Doubles]) -> tuple[ObjMesh, list[Doubles]]:
+    """The mesh and its shapes with each vertex once, in the file's order.
+
+    A polygon that becomes a line by it is left out.
+
+    Args:
+        mesh: as the file has it.
+        deltas: float64[V, 3] of each shape.
+    """
+    of = _first_alike(mesh, deltas)
+    kept = np.flatnonzero(of == np.arange(len(of)))
+    if len(kept) == len(of):
+        return mesh, list(deltas)
+    place = np.zeros(len(of), np.int64)
+    place[kept] = np.arange(len(kept))
+    now = place[of].tolist()
+    out = ObjMesh(mesh.positions[kept], mesh.uvs)
+    has_uvs = bool(mesh.uv_faces)
+    for number, face in enumerate(mesh.faces):
+        corners = [now[vertex] for vertex in face]
+        apart = [i for i, vertex in enumerate(corners) if vertex != corners[i - 1]]
+        if len({corners[i] for i in apart}) < 3:
+            continue
+        out.faces.append([corners[i] for i in apart])
+        if has_uvs:
+            uvs = mesh.uv_faces[number]
+            out.uv_faces.append([uvs[i] for i in apart] if uvs else [])
+    return out, [delta[kept] for delta in deltas]
+
+
+def _first_alike(mesh: ObjMesh, deltas: Sequence[Doubles]) -> Ints:
+    """int64[V]: the first vertex that each one is the same as, itself for most."""
+    points = mesh.positions
+    out = np.arange(len(points))
+    rim = _open_vertices(mesh) if mesh.faces else out[:0]
+    if len(rim) < 2:
+        return out
+    size = float(np.ptp(points, axis=0).max())
+    far = float(np.abs(points).max())
+    same = max(_SAME * size, _ROUNDINGS * far * float(np.finfo(np.float32).eps))
+    if not same:
+        return out
+    owner = out.tolist()
+    for first, second in _pairs(points, rim, same):
+        alike = np.abs(points[first] - points[second]).max(axis=1) <= same
+        for delta in deltas:
+            alike &= np.abs(delta[first] - delta[second]).max(axis=1) <= same
+        for a, b in zip(first[alike].tolist(), second[alike].tolist(), strict=True):
+            roots = _root(owner, a), _root(owner, b)
+            owner[max(roots)] = min(roots)
+    return np.array([_root(owner, vertex) for vertex in range(len(owner))], np.int64)
+
+
+def _root(owner: list[int], vertex: int) -> int:
+    while owner[vertex] != vertex:
+        owner[vertex] = owner[owner[vertex]]
+        vertex = owner[vertex]
+    return vertex
+
+
+def _open_vertices(mesh: ObjMesh) -> Ints:
+    """Vertices of edges that one polygon alone has."""
+    faces = mesh.faces
+    begins = np.fromiter(itertools.chain.from_iterable(faces), np.int64)
+    ends = np.fromiter(itertools.chain.from_iterable((*f[1:], f[0]) for f in faces), np.int64)
+    edges = np.sort(np.stack([begins, ends], axis=1), axis=1)
+    each, counts = np.unique(edges, axis=0, return_counts=True)
+    return np.unique(each[counts == 1])
+
+
+def _pairs(points: Doubles, rim: Ints, same: float) -> list[tuple[Ints, Ints]]:
+    """Vertices that share a cell with another: the cell's first and each other one.
+
+    Grids are shifted by half a cell along each axis, so that no border lies between two that are
+    the same in all of them.
+    """
+    out = []
+    cell = 4 * same
+    for shift in itertools.product((0.0, 0.5), repeat=3):
+        keys = np.floor(points[rim] / cell + shift)
+        _, first, of = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        one: npt.NDArray[np.int64] = first[of.ravel()]
+        other = np.flatnonzero(one != np.arange(len(rim)))
+        out.append((rim[one[other]], rim[other]))
+    return out
