@@ -20,6 +20,7 @@ from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, propertie
 from ...importing.source import read_bytes
 from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError, choose_mesh, refuse_other_kinds
+from .welding import welded
 
 SUFFIX = ".fbx"
 _SKIPPED = frozenset(("Video", "Texture", "Material", "Pose", "Implementation"))
@@ -31,7 +32,9 @@ _DEEPEST = 64  # nodes above a mesh
 def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     """A mesh in metres, y up, and float64[V, 3] of each of its blend shapes by name.
 
-    Of a channel with several targets that are reached one after the other, the last is taken.
+    Of a channel with several targets that are reached one after the other, the last is taken. The
+    mesh stands where its node puts it, or its skin as it was bound. Vertices that a file has
+    several times, as exporters for games write them along seams of the texture, are one.
 
     Args:
         path: of the file.
@@ -60,7 +63,11 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     }
     ends = np.cumsum([len(face) for face in faces])[:-1]
     uv_faces = [part.tolist() for part in np.split(uv_corners, ends)]
-    return ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces), shapes
+    if np.linalg.det(turn[:3, :3]) < 0:  # a mirror shows the backs of polygons
+        faces, uv_faces = ([row[::-1] for row in rows] for rows in (faces, uv_faces))
+    found = ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces)
+    found, moved = welded(found, list(shapes.values()))
+    return found, dict(zip(shapes, moved, strict=True))
 
 
 def _choose(scene: Scene, path: Path, wanted: str) -> int:
@@ -208,15 +215,41 @@ def _model_of(scene: Scene, number: int) -> int:
 
 
 def _to_world(scene: Scene, mesh: int) -> Doubles:
-    """float64[4, 4] of a mesh' node and of all above it, column vectors."""
+    """float64[4, 4] of a mesh' node and of all above it, or of its skin, column vectors."""
     at = _model_of(scene, mesh)
     out = _geometric(scene, scene.objects[at]) if at else np.eye(4)
-    for _ in range(_DEEPEST):
-        if not at:
-            break
-        out = _local(scene, scene.objects[at]) @ out
-        at = _model_of(scene, at)
+    bound = _bound(scene, mesh)
+    return (_chain(scene, at)[1] if bound is None else bound) @ out
+
+
+def _chain(scene: Scene, node: int) -> tuple[int, Doubles]:
+    """How many nodes are above a node and itself, and float64[4, 4] what all of them do."""
+    out, depth = np.eye(4), 0
+    while node and depth < _DEEPEST:
+        out = _local(scene, scene.objects[node]) @ out
+        node, depth = _model_of(scene, node), depth + 1
+    return depth, out
+
+
+def _bound(scene: Scene, mesh: int) -> Doubles | None:
+    """float64[4, 4] of a skinned mesh as it was bound, where the joint that is nearest to the root
+    stands, whatever its own node and other joints do; None: no skin says how."""
+    nearest, out = _DEEPEST + 1, None
+    for skin, _ in _below(scene, mesh, "Deformer", "Skin"):
+        for cluster, node in _below(scene, skin, "Deformer", "Cluster"):
+            place = _numbers(scene, node, "Transform")  # of the mesh, as the joint sees it
+            joints = [n for n in scene.children.get(cluster, []) if _is_model(scene, n)]
+            if place.size != 16 or not joints:
+                continue
+            depth, stands = _chain(scene, joints[0])
+            if depth < nearest:
+                nearest, out = depth, stands @ place.reshape(4, 4).T.astype(np.float64)
     return out
+
+
+def _is_model(scene: Scene, number: int) -> bool:
+    node = scene.objects.get(number)
+    return node is not None and node.name == "Model"
 
 
 def _geometric(scene: Scene, node: Node) -> Doubles:

@@ -23,6 +23,7 @@ from . import fbx, gltf
 from .matching import Assignment, assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, combined_rows, make_shape_face, take_combined
+from .welding import welded
 
 _READERS = {suffix: gltf.read_gltf for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: fbx.read_fbx}
 _BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
@@ -223,4 +224,6 @@ def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:
             f"{folder / spec.source['expressions']}: a folder of OBJ files was expected, one for "
             "each expression"
         )
+    out.mesh, moved = welded(mesh, list(out.expressions.values()))
+    out.expressions = dict(zip(out.expressions, moved, strict=True))
     return out

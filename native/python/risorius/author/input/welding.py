@@ -11,12 +11,12 @@ import itertools
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh
 
 _SAME = 1e-6  # of the mesh' size
+_FARTHEST = 1e30  # beyond, differences of coordinates are no numbers: who checks sizes refuses them
 _ROUNDINGS = 4  # of float32, at the farthest vertex from the origin
 
 
@@ -57,10 +57,10 @@ def _first_alike(mesh: ObjMesh, deltas: Sequence[Doubles]) -> Ints:
     rim = _open_vertices(mesh) if mesh.faces else out[:0]
     if len(rim) < 2:
         return out
-    size = float(np.ptp(points, axis=0).max())
     far = float(np.abs(points).max())
+    size = min(far, float((points.max(axis=0) / 2 - points.min(axis=0) / 2).max())) * 2
     same = max(_SAME * size, _ROUNDINGS * far * float(np.finfo(np.float32).eps))
-    if not same:
+    if not 0 < same < _FARTHEST:
         return out
     owner = out.tolist()
     for first, second in _pairs(points, rim, same):
@@ -85,9 +85,10 @@ def _open_vertices(mesh: ObjMesh) -> Ints:
     faces = mesh.faces
     begins = np.fromiter(itertools.chain.from_iterable(faces), np.int64)
     ends = np.fromiter(itertools.chain.from_iterable((*f[1:], f[0]) for f in faces), np.int64)
-    edges = np.sort(np.stack([begins, ends], axis=1), axis=1)
-    each, counts = np.unique(edges, axis=0, return_counts=True)
-    return np.unique(each[counts == 1])
+    count = len(mesh.positions)
+    edges = np.minimum(begins, ends) * count + np.maximum(begins, ends)
+    each, counts = np.unique(edges, return_counts=True)
+    return np.unique(np.stack(np.divmod(each[counts == 1], count)))
 
 
 def _pairs(points: Doubles, rim: Ints, same: float) -> list[tuple[Ints, Ints]]:
@@ -98,10 +99,14 @@ def _pairs(points: Doubles, rim: Ints, same: float) -> list[tuple[Ints, Ints]]:
     """
     out = []
     cell = 4 * same
+    places = (points[rim] - points[rim].min(axis=0)) / cell
+    across = int(places.max()) + 2  # cells: a quarter of a million at most, whose cube is a number
     for shift in itertools.product((0.0, 0.5), repeat=3):
-        keys = np.floor(points[rim] / cell + shift)
-        _, first, of = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        one: npt.NDArray[np.int64] = first[of.ravel()]
+        x, y, z = np.floor(places + shift).astype(np.int64).T
+        _, first, of = np.unique(
+            (x * across + y) * across + z, return_index=True, return_inverse=True
+        )
+        one = first[of.ravel()]
         other = np.flatnonzero(one != np.arange(len(rim)))
         out.append((rim[one[other]], rim[other]))
     return out
