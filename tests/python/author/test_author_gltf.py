@@ -128,6 +128,9 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
     assert "morph targets was expected, found none" in said(lambda j: j.update(meshes=none))
     assert "one of Egg was expected, found Ham" in said(None, mesh="Ham")
     assert "triangles were expected" in said(primitive("mode", 1))
+    assert "accessors[a number of 401 digits] was expected, there are" in said(
+        lambda j: j["meshes"][0]["primitives"][0].update(indices=10**400)
+    )
     assert "nodes[1]: it hangs on itself" in said(lambda j: j["nodes"][1].update(children=[0]))
     assert "componentType: one of 5120, 5121, 5122, 5123, 5126 was expected, found 5125" in said(
         accessor(0, componentType=5125)

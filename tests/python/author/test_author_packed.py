@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Heads that are packed or quantized are as their plain twins; damaged ones are refused."""
 
+import functools
 import sys
 
 import face_shapes
@@ -254,3 +255,36 @@ def test_a_head_that_draco_packed(tmp_path):
     assert "an attribute of 0 was expected, found 7" in said(
         change=lambda d: d.update(attributes={"POSITION": 7})
     )
+
+
+def test_every_odd_value_of_the_json_is_one_sentence_that_names_the_file(tmp_path):
+    """Each place of the JSON, one odd value at a time: no traceback, no warning, no gigabytes."""
+    path = tmp_path / "odd.glb"
+    random = np.random.default_rng(20261128)
+    odd = [None, -1, [], {}, "x", 1e308, 10**400, True, 2**53, 0.5, float("nan"), 7, 2**31]
+
+    def places(value, at=()):
+        yield at
+        rows = value.items() if isinstance(value, dict) else enumerate(value[:3])
+        for key, inner in rows if isinstance(value, dict | list) else ():
+            yield from places(inner, (*at, key)) if isinstance(inner, dict | list) else [(*at, key)]
+
+    def spoil(document, at):
+        *way, last = at
+        for key in way:
+            document = document[key]
+        document[last] = odd[int(random.integers(len(odd)))]
+
+    everywhere = []
+    head(path, packed=True, change=lambda document: everywhere.extend(places(document)))
+    everywhere = [at for at in everywhere if at and at[0] != "buffers"]  # which are written last
+    refused = 0
+    for at in everywhere:
+        head(path, packed=True, change=functools.partial(spoil, at=at))
+        try:
+            read_gltf(path)
+        except RisoriusError as error:
+            assert str(error).startswith(str(path))
+            assert len(str(error)) < 400
+            refused += 1
+    assert refused > 0.4 * len(everywhere)

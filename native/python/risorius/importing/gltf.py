@@ -76,7 +76,7 @@ class Document:
         if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
             raise self.fail(place, f"an index of {kind} was expected, found {shown(index)}")
         if not 0 <= index < len(rows) or not isinstance(rows[index], dict):
-            raise self.fail(place, f"{kind}[{index}] was expected, there are {len(rows)}")
+            raise self.fail(place, f"{kind}[{shown(index)}] was expected, there are {len(rows)}")
         return rows[index]
 
     def whole(self, table: Mapping[str, Any], key: str, place: str, default: int = 0) -> int:
@@ -170,11 +170,12 @@ class Document:
         count = self.whole(accessor, "count", at)
         self.budget.hold(count * width * 8, at)
         out = np.zeros((count, width))
-        if "bufferView" in accessor:
-            out[:] = self._viewed(accessor, at, dtype, (count, width))
         sparse = accessor.get("sparse")
-        if isinstance(sparse, dict):
-            self._put_sparse(sparse, f"{at}.sparse", dtype, out)
+        with np.errstate(invalid="ignore"):  # of some NaNs, which are refused below
+            if "bufferView" in accessor:
+                out[:] = self._viewed(accessor, at, dtype, (count, width))
+            if isinstance(sparse, dict):
+                self._put_sparse(sparse, f"{at}.sparse", dtype, out)
         if accessor.get("normalized") is True and dtype.kind != "f":
             out = np.maximum(out / np.iinfo(dtype).max, -1.0)
         if not np.isfinite(out).all():
