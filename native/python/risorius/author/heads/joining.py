@@ -91,7 +91,9 @@ def join(
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")
     if wrong:
         raise ShapeFileError(f"{where}: source: {wrong}")
-    face = choose_face(where, [p for p in parts if len(p.mesh.positions)], wishes.mesh)
+    face = choose_face(
+        where, [p for p in parts if len(p.mesh.positions)], wishes.mesh, wishes.rather
+    )
     return _Joining(face, parts, unit, wishes, edited, axes).made()
 
 

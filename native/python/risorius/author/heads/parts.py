@@ -67,6 +67,7 @@ class Wishes:
 
     Attributes:
         mesh: name of the one that is the face.
+        rather: name of the one that it is where there are several heads.
         left, up, front: one of AXES each.
         unit: of the numbers, see sizes.UNITS.
         scale: what all numbers are multiplied with, on top of the unit.
@@ -74,6 +75,7 @@ class Wishes:
     """
 
     mesh: str = ""
+    rather: str = ""
     left: str = ""
     up: str = ""
     front: str = ""

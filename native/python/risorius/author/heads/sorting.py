@@ -31,13 +31,14 @@ def moves(part: HeadPart) -> bool:
     return any(np.abs(d).max(initial=0.0) > 1e-6 * size for d in part.shapes.values())
 
 
-def choose_face(where: str, parts: Sequence[HeadPart], wanted: str) -> HeadPart:
+def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str = "") -> HeadPart:
     """The mesh with most vertices in shapes, or that of a name.
 
     Args:
         where: what errors call the file.
         parts: all meshes.
         wanted: its name, or "".
+        rather: its name where there are several heads.
 
     Raises:
         ShapeFileError: none that moves, none of that name, or two heads.
@@ -53,11 +54,14 @@ def choose_face(where: str, parts: Sequence[HeadPart], wanted: str) -> HeadPart:
         raise ShapeFileError(f"{where}: a mesh with shapes was expected, found none")
     face = max(named, key=lambda p: (len(p.shapes) * len(p.mesh.positions), -parts.index(p)))
     others = [part for part in able if part is not face and is_other_head(face, part)]
+    chosen = [part for part in (face, *others) if part.source == rather]
+    if others and chosen:
+        return chosen[0]
     if others and not wanted:
         names = joined([face.name, *(part.name for part in others)])
         raise ShapeFileError(
             f"{where}: one head was expected, {names} have the same shapes at places of their own: "
-            "source.mesh (in Blender: the active object) says which one is meant"
+            "source.mesh says which one is meant"
         )
     return face
 

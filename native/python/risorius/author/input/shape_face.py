@@ -36,6 +36,7 @@ class ShapeSet:
     unit: str = "cm"
     parts: list[FacePart] = field(default_factory=list)  # meshes that it is divided into
     turns: list[Turn] = field(default_factory=list)  # joints of eyes and jaw
+    notes: list[str] = field(default_factory=list)  # what was guessed, a sentence each
 
 
 def shape_set(name: str, head: Joined) -> ShapeSet:
@@ -46,7 +47,14 @@ def shape_set(name: str, head: Joined) -> ShapeSet:
         head: the meshes.
     """
     return ShapeSet(
-        name, head.mesh, dict(head.shapes), head.left, head.unit, head.parts, head.turns
+        name,
+        head.mesh,
+        dict(head.shapes),
+        head.left,
+        head.unit,
+        head.parts,
+        head.turns,
+        head.notes,
     )
 
 
