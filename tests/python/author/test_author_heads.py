@@ -127,6 +127,10 @@ def test_lower_teeth_and_tongue_go_with_the_jaw_and_the_rest_stays(tmp_path):
     assert np.abs(moved(found.dna, "tongue", "jawOpen")[1]).max() > 1
     for mesh in ("teethUpper", "glasses", "eyeLeft"):
         assert not np.abs(moved(found.dna, mesh, "jawOpen")[1]).max()
+    points, faces, shapes = likenesses.skull()
+    only = likenesses.mesh("Head", (points, faces), {"viseme_aa": shapes["jawOpen"]})
+    spoken = read(saved(tmp_path, [only, *made("Face Cap")[2:3]]))
+    assert np.abs(moved(spoken.dna, "teethLower", "viseme_aa")[1] - opened).max() < 0.05
     lines = {"teethLower hangs on the jaw", "teethUpper hangs on the head",
              "tongue hangs on the jaw", "glasses hangs on the head"}  # fmt: skip
     assert lines <= set(found.odd)
@@ -141,6 +145,7 @@ def test_eyes_turn_with_look_controls_by_usual_angles_or_by_those_of_the_shapes(
     arm = points - likenesses.EYE
     up = arm @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]).T - arm  # down, about x
     shapes["eyeLookUp_L"] = np.where(left[:, None], -up, 0)
+    shapes["PupilDilate_L"] = np.where(left[:, None] & (arm[:, 2:] > 1.2), arm * [0.3, 0.3, 0], 0)
     found = read(saved(tmp_path, [{**meshes[0], "shapes": shapes}]))
     for mesh, control, way in (
         ("eyeLeft", "eyeLookUpL", [0, np.sin(angle), 0]),
@@ -153,7 +158,8 @@ def test_eyes_turn_with_look_controls_by_usual_angles_or_by_those_of_the_shapes(
         assert got[:2] == pytest.approx(way[:2], abs=0.1)
     assert not np.abs(moved(found.dna, "eyeRight", "eyeLookUpL")[1]).max()
     targets = [len(m.blend_shape_targets) for m in found.dna.meshes]
-    assert targets[1:] == [0, 0]  # the eyes turn, and nothing else moves them
+    assert targets[1:] == [1, 0]  # the eyes turn, and a pupil grows
+    assert found.kept == ("eyeLeft_lod", "eyeRight_lod")
 
 
 def test_a_lopsided_head_stays_as_it_is(tmp_path):

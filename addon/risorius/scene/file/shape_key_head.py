@@ -190,6 +190,7 @@ def rig_task(
             author.FitOptions(joints=joints),
             tolerance_mm,
             lods=author.LodOptions(count=levels),
+            kept=shapes.kept,
         )
         rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
         if not cancelled():

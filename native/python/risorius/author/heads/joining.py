@@ -21,6 +21,7 @@ from .turning import Eye, Turn, eye_turn, jaw_turn, take_eyes
 
 _OFF = 0.1  # of the width: a face that is further from x = 0 is moved there
 _TOLD_MM = 1.0
+_VOWELS = ("aa", "oh", "E")  # expressions that open the mouth, the widest first
 
 
 @dataclass
@@ -132,8 +133,7 @@ class _Joining:
         self._turn()
         self._size()
         height = self.height
-        opening = next((self.face.shapes[n] for n, c in self.became.controls.items()
-                        if "jawOpen" in c), None)  # fmt: skip
+        opening = self._opening()
         mm = UNITS[self.unit]
         places = Places(self.face, height, mm, opening)
         moving, still = [self.face], list[HeadPart]()
@@ -233,6 +233,13 @@ class _Joining:
         else:
             still.append(part)
 
+    def _opening(self) -> Doubles | None:
+        """What opens the mouth: the jaw's own shape, or a wide vowel."""
+        named = [n for n, controls in self.became.controls.items() if controls == ["jawOpen"]]
+        meant = {expression: name for name, expression in self.became.expressions.items()}
+        named += [meant[vowel] for vowel in _VOWELS if vowel in meant]
+        return next((self.face.shapes[n] for n in named if n in self.face.shapes), None)
+
     def _lids(self) -> dict[str, Doubles]:
         """The middle of what a blink moves, by side."""
         out = {}
@@ -254,8 +261,8 @@ class _Joining:
         self.notes.append(f"{names}: the {side} eye turns with the look controls")
         if far:
             more = f" and {len(far) - 3} more" if len(far) > 3 else ""
-            self.notes.append(f"the {side} eye turns only: what {', '.join(far[:3])}{more} do to "
-                              "it beside that is left out")  # fmt: skip
+            names = ", ".join(far[:3]) + more
+            self.notes.append(f"what {names} do to the {side} eye beside turning it is left out")
         return turn
 
     def _jaw(

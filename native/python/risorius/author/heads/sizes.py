@@ -71,8 +71,8 @@ def find_unit(height: float, unit: str, *, sure: bool) -> tuple[str, str]:
     # inch and foot only where no power of ten fits
     best = min(fits, key=lambda u: (u in ("inch", "foot"), abs(np.log(height * UNITS[u] / _USUAL))))
     return best, (
-        f"the face is {height:.4g} high, in {unit} {in_words(as_said)}, and {usual}: taken as "
-        f"{best}, {in_words(height * UNITS[best])}; {_MENDS}"
+        f"the face would be {in_words(as_said)} high in {unit}, and {usual}: taken as {best}, "
+        f"{in_words(height * UNITS[best])}; {_MENDS}"
     )
 
 

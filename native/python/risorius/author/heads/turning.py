@@ -154,14 +154,15 @@ def _divided(part: HeadPart, islands: Ints, eyes: Sequence[Eye]) -> list[HeadPar
 
 def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dict[str, float]]:
     """The joint of an eye: shapes that turn the ball say by how much, else look controls have usual
-    angles. And by name how far what shapes do beside that would move it.
+    angles. And by name how far what these shapes do beside that would move it.
 
     Args:
-        eye: its parts lose their shapes.
+        eye: its parts keep the shapes that do not turn them, such as a pupil's.
         controls: raw controls without prefix by shape.
     """
     turn = Turn(eye.joint, eye.ball.middle)
     left: dict[str, float] = {}
+    kept: list[str] = []
     names = dict.fromkeys(name for part in eye.parts for name in part.shapes)
     points = np.concatenate([part.mesh.positions for part in eye.parts])
     for name in names:
@@ -175,19 +176,19 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         every = controls.get(name, ())
         own = [control for control in every if control.endswith(eye.side) or len(every) == 1]
         arm = points - eye.ball.middle
-        rest = delta - (arm @ rotation.T - arm)
         if angle > _LEAST_ANGLE and own:
             turn.motions.setdefault(own[0], (rotation, np.zeros(3)))
+            rest = delta - (arm @ rotation.T - arm)
+            left[name] = float(np.linalg.norm(rest, axis=1).max())
         else:
-            rest = delta
-        left[name] = float(np.linalg.norm(rest, axis=1).max())
+            kept.append(name)
     for look, angles in _LOOKS.items():
         x, y = np.radians(angles)
         vector = np.array([[x, y, 0.0]])
         rotation = sk.matrices_of_vectors(vector)[0]
         turn.motions.setdefault(look + eye.side, (rotation, np.zeros(3)))
     for part in eye.parts:
-        part.shapes = {}
+        part.shapes = {name: part.shapes[name] for name in kept if name in part.shapes}
     return turn, left
 
 
@@ -225,7 +226,7 @@ def jaw_turn(
         own = controls.get(name, ())
         if len(own) != 1 or not (own[0].startswith("jaw") or name in whole):
             continue
-        rows = held if own[0] == "jawOpen" else chin
+        rows = held if delta is opening else chin
         if np.linalg.norm(delta[rows], axis=1).mean() > least:
             fitted = rigid_fit(points[rows], points[rows] + delta[rows])
             turn.motions[own[0]] = about(turn.position, *fitted)

@@ -38,6 +38,11 @@ class ShapeSet:
     turns: list[Turn] = field(default_factory=list)  # joints of eyes and jaw
     notes: list[str] = field(default_factory=list)  # what was guessed, a sentence each
 
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Names of the meshes that turn with an eye's joint, and with no others."""
+        return tuple(f"{p.name}_lod" for p in self.parts if p.joint.endswith("_Eye"))
+
 
 def shape_set(name: str, head: Joined) -> ShapeSet:
     """A head of several meshes as what a face is made from.

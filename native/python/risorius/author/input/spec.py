@@ -94,12 +94,14 @@ class Read:
         became: what each shape became; nothing where the source is a DNA.
         odd: what is odd, guessed or left out, a sentence each.
         materials: of meshes of the face, by their names.
+        kept: meshes that keep their joints, see RigOptions.
     """
 
     dna: Dna
     became: Assignment
     odd: list[str]
     materials: dict[str, Material] = field(default_factory=dict)
+    kept: tuple[str, ...] = ()
 
 
 def read_spec(path: Path) -> Spec:
@@ -232,7 +234,7 @@ def read_face(spec: Spec) -> Read:
         face = shapes.parts[0]
         own = [(controls, delta[face.start : face.stop]) for controls, delta in rows]
         dna = add_correctives(dna, 0, own)
-    return Read(dna, became, about + odd + became.notes, materials)
+    return Read(dna, became, about + odd + became.notes, materials, shapes.kept)
 
 
 def _read_shapes(spec: Spec, folder: Path) -> tuple[ShapeSet, list[str]]:

@@ -117,6 +117,7 @@ def run(args: argparse.Namespace) -> int:
         if args.report.resolve() == args.out.resolve():
             raise CommandLineError("author: another file than that of -o was expected of --report")
         need_plot()
+    options = replace(options, kept=(*options.kept, *read.kept))
     say, source = _Clock(quiet=args.json), dna
     if asked.most or asked.together:
         say.line("looking for what goes wrong where expressions meet")
