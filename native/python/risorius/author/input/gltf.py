@@ -75,12 +75,18 @@ def _choose(document: Document, path: Path, wanted: str) -> int:
     for number, row in enumerate(rows if isinstance(rows, list) else []):
         size = sum(_targets(p) * _vertices(document, p) for p in primitives(document, row, number))
         if size:
-            found.append((number, _name_of(document, row, number), size))
+            found.append((number, name_of(document, row, number), size))
     return choose_mesh(path, "morph targets", found, wanted)
 
 
-def _name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
-    """A mesh' name, or that of its node or of the nearest above: packers drop names of meshes."""
+def name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
+    """A mesh' name, or that of its node or of the nearest above: packers drop names of meshes.
+
+    Args:
+        document: of open_document.
+        row: the mesh' table of the JSON.
+        number: of the mesh.
+    """
     world = _World(document)
     node = world.of_mesh(number)
     names = [row, *(world.rows[n] for n in (world.above(node) if node >= 0 else ()))]

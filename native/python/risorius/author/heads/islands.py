@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: MIT
+"""Parts of a mesh that no polygon joins, and which of them are balls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.skeleton import Doubles, Ints
+from ..input.obj import ObjMesh
+
+_ROUND = 0.12  # of the radius: how far the vertices of a ball may lie off in the mean
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere: the vertices that lie on it, float64[3] and its radius."""
+
+    vertices: Ints
+    middle: Doubles
+    radius: float
+
+
+def islands_of(mesh: ObjMesh) -> Ints:
+    """int64[V]: the number of the island of each vertex, from 0 in the order of vertices."""
+    count = len(mesh.positions)
+    label = np.arange(count)
+    if mesh.faces:
+        sizes = np.array([len(face) for face in mesh.faces])
+        corners = np.concatenate([np.asarray(face, np.int64) for face in mesh.faces])
+        begins = np.cumsum(sizes) - sizes
+        while True:
+            least = np.minimum.reduceat(label[corners], begins)
+            new = label.copy()
+            np.minimum.at(new, corners, np.repeat(least, sizes))
+            new = np.minimum(new, new[new])
+            new = new[new]
+            if np.array_equal(new, label):
+                break
+            label = new
+    return np.unique(label, return_inverse=True)[1].ravel()
+
+
+def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:
+    """The sphere that vertices lie on, or more than a third of one; None where they do not.
+
+    Args:
+        points: float64[V, 3].
+        vertices: which of them.
+        off: how far they may lie off, of the radius.
+    """
+    own = points[vertices]
+    if len(own) < 12:
+        return None
+    origin = own.mean(axis=0)
+    rows = np.column_stack([2 * (own - origin), np.ones(len(own))])
+    solution, _, rank, _ = np.linalg.lstsq(rows, ((own - origin) ** 2).sum(axis=1), rcond=1e-9)
+    if rank < 4:
+        return None
+    middle = origin + solution[:3]
+    lengths = np.linalg.norm(own - middle, axis=1)
+    radius = float(lengths.mean())
+    extent = np.ptp(own, axis=0)
+    whole = extent.max() >= 1.2 * radius and extent.min() >= 0.5 * radius
+    if not whole or lengths.std() > off * radius:
+        return None
+    return Ball(vertices, np.asarray(middle), radius)
