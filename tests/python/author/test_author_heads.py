@@ -349,3 +349,14 @@ def test_a_folder_of_obj_files_is_a_head(tmp_path):
     (tmp_path / "neutral.obj").unlink()
     with pytest.raises(ShapeFileError, match="an OBJ file called neutral, basis"):
         read(tmp_path)
+
+
+def test_a_jaw_shape_that_moves_nothing_leaves_the_mouth_to_a_vowel(tmp_path):
+    """As VRoid heads have it to which the names of ARKit were added."""
+    meshes = likenesses.face_cap()
+    for mesh in meshes:
+        if "jawOpen" in mesh.get("shapes", {}):
+            mesh["shapes"]["viseme_aa"] = mesh["shapes"]["jawOpen"]
+            mesh["shapes"]["jawOpen"] = np.zeros_like(mesh["shapes"]["jawOpen"])
+    found = read(saved(tmp_path, meshes))
+    assert "jawOpen moves nothing" in found.odd

@@ -234,11 +234,12 @@ class _Joining:
             still.append(part)
 
     def _opening(self) -> Doubles | None:
-        """What opens the mouth: the jaw's own shape, or a wide vowel."""
+        """What opens the mouth: the jaw's own shape, or a wide vowel; some files have empty ones."""
         named = [n for n, controls in self.became.controls.items() if controls == ["jawOpen"]]
         meant = {expression: name for name, expression in self.became.expressions.items()}
         named += [meant[vowel] for vowel in _VOWELS if vowel in meant]
-        return next((self.face.shapes[n] for n in named if n in self.face.shapes), None)
+        shapes = (self.face.shapes[n] for n in named if n in self.face.shapes)
+        return next((shape for shape in shapes if shape.any()), None)
 
     def _lids(self) -> dict[str, Doubles]:
         """The middle of what a blink moves, by side."""

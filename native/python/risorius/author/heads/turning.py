@@ -78,6 +78,8 @@ def take_eyes(
     rest = []
     for part, islands in zip(parts, labels, strict=True):
         rest.extend(_divided(part, islands, eyes))
+    if not all(eye.parts for eye in eyes):  # a shell that is a part of no ball, as painted eyes are
+        return list(parts), []
     return rest, eyes
 
 
