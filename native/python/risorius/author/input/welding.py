@@ -35,7 +35,7 @@ def welded(
     if all_polygons and (of != np.arange(len(of))).any():
         root = of.tolist()
         for face in mesh.faces:
-            if len({root[v] for v in face}) < 3:
+            if len({root[v] for v in face}) < min(3, len(set(face))):
                 of[face] = face
     kept = np.flatnonzero(of == np.arange(len(of)))
     if len(kept) == len(of):
