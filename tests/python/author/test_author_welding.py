@@ -60,17 +60,14 @@ def test_what_moves_apart_and_what_is_closed_stays_two():
     assert was.max() == 505
 
 
-def test_polygons_that_become_lines_are_left_out():
+def test_a_polygon_that_would_become_a_line_is_left_out_or_stays_as_it_is():
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0]], float)
-    mesh = ObjMesh(
-        points,
-        points[:, :2],
-        [[0, 1, 2, 3], [2, 4, 1], [4, 5, 1]],
-        [[0, 1, 2, 3], [2, 4, 1], [4, 5, 1]],
-    )
-    found, _ = welded(mesh, [])
+    faces = [[0, 1, 2, 3], [2, 4, 1], [4, 5, 1]]
+    mesh = ObjMesh(points, points[:, :2], faces, faces)
+    found, _ = welded(mesh, [], all_polygons=False)
     assert found.faces == [[0, 1, 2, 3], [2, 4, 1]]
     assert found.uv_faces == [[0, 1, 2, 3], [4, 5, 1]]
+    assert welded(mesh, [])[0].faces == faces
 
 
 def test_a_cut_head_of_obj_files_becomes_one_surface(tmp_path):

@@ -166,7 +166,8 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
         np.concatenate(d)[used] @ size.T for d in zip(*(p.deltas for p in parts), strict=True)
     ]
     faces = corners.tolist()
-    mesh, moved = welded(ObjMesh(points @ size.T + turn[:3, 3], uvs, faces, faces), deltas)
+    mesh = ObjMesh(points @ size.T + turn[:3, 3], uvs, faces, faces)
+    mesh, moved = welded(mesh, deltas, all_polygons=False)
     return mesh, dict(zip(names, moved, strict=True))
 
 

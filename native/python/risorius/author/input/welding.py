@@ -20,16 +20,23 @@ _FARTHEST = 1e30  # beyond, differences of coordinates are no numbers: who check
 _ROUNDINGS = 4  # of float32, at the farthest vertex from the origin
 
 
-def welded(mesh: ObjMesh, deltas: Sequence[Doubles]) -> tuple[ObjMesh, list[Doubles]]:
+def welded(
+    mesh: ObjMesh, deltas: Sequence[Doubles], *, all_polygons: bool = True
+) -> tuple[ObjMesh, list[Doubles]]:
     """The mesh and its shapes with each vertex once, in the file's order.
-
-    A polygon that becomes a line by it is left out.
 
     Args:
         mesh: as the file has it.
         deltas: float64[V, 3] of each shape.
+        all_polygons: where a polygon would become a line, its vertices stay apart, so that each
+            keeps its number; else it is left out.
     """
     of = _first_alike(mesh, deltas)
+    if all_polygons and (of != np.arange(len(of))).any():
+        root = of.tolist()
+        for face in mesh.faces:
+            if len({root[v] for v in face}) < min(3, len(set(face))):
+                of[face] = face
     kept = np.flatnonzero(of == np.arange(len(of)))
     if len(kept) == len(of):
         return mesh, list(deltas)
@@ -41,7 +48,7 @@ def welded(mesh: ObjMesh, deltas: Sequence[Doubles]) -> tuple[ObjMesh, list[Doub
     for number, face in enumerate(mesh.faces):
         corners = [now[vertex] for vertex in face]
         apart = [i for i, vertex in enumerate(corners) if vertex != corners[i - 1]]
-        if len({corners[i] for i in apart}) < 3:
+        if not all_polygons and len({corners[i] for i in apart}) < 3:
             continue
         out.faces.append([corners[i] for i in apart])
         if has_uvs:
