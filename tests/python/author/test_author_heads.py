@@ -10,6 +10,7 @@ import likenesses
 import numpy as np
 import pytest
 import risorius
+from fbx_files import I64, fbx
 from risorius.author import work
 from risorius.author.input import spec
 from risorius.author.input.obj import ShapeFileError
@@ -340,15 +341,96 @@ def test_a_folder_of_obj_files_is_a_head(tmp_path):
         face_shapes.write_obj(tmp_path / f"{name}.obj", positions + delta, faces)
     hair, strands = likenesses.ball([0, 5, -3], 10.5)
     face_shapes.write_obj(tmp_path / "hair.obj", hair, strands)
+    neutral = tmp_path / "neutral.obj"
+    text = neutral.read_text(encoding="utf-8").replace("f ", "usemtl Skin\nf ", 1)
+    neutral.write_text("mtllib head.mtl\n" + text, encoding="utf-8")
+    lines = ["newmtl Skin", "Kd 0.5 0.5 0.5", "map_Kd -s 1 1 1 maps/skin.png", "norm no.png"]
+    (tmp_path / "head.mtl").write_text("\n".join(lines), encoding="utf-8")
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "skin.png").write_bytes(png(np.zeros((4, 4))))
     found = read(tmp_path)
+    look = found.materials[found.dna.mesh_names[0]]
+    assert look.pictures == {"color": png(np.zeros((4, 4)))}
+    assert "Skin: its normal texture is left out" in look.notes[0]
     assert list(found.dna.mesh_names) == [f"{tmp_path.name}_lod0_mesh", "hair_lod0_mesh"]
     assert "hair hangs on the head" in found.odd
+    (tmp_path / "head.mtl").unlink()
+    lost = read(tmp_path).materials[found.dna.mesh_names[0]].notes
+    assert "head.mtl: the materials are left out" in lost[0]
     face_shapes.write_obj(tmp_path / "jawOpen.obj", hair, strands)
     with pytest.raises(ShapeFileError, match=r"jawOpen\.obj: 506 vertices were expected"):
         read(tmp_path)
     (tmp_path / "neutral.obj").unlink()
     with pytest.raises(ShapeFileError, match="an OBJ file called neutral, basis"):
         read(tmp_path)
+
+
+def fbx_head(path, picture, *, embedded):
+    """A head, and eyes of two materials, as an FBX of centimetres."""
+    points, faces, shapes = likenesses.skull()
+    eyes = likenesses.joined(*likenesses.eyes())
+    objects, links = [], []
+
+    def link(child, parent, *way):
+        links.append(("C", ("OP" if way else "OO", I64(child), I64(parent), *way)))
+
+    for number, (name, (own, own_faces)) in enumerate(
+        {"Head": (points, faces), "Eyes": eyes}.items(), 1
+    ):
+        order = np.array(own_faces, "<i4")
+        order[:, 2] = ~order[:, 2]
+        half = (np.arange(len(order)) >= len(order) // 2).astype("<i4")
+        looks = [("MappingInformationType", ("ByPolygon",)), ("Materials", (half,))]
+        inner = [("Vertices", (np.ascontiguousarray(own, "<f8").ravel(),)),
+                 ("PolygonVertexIndex", (order.ravel(),))]  # fmt: skip
+        if name == "Eyes":
+            inner.append(("LayerElementMaterial", (0,), looks))
+        objects.append(("Geometry", (I64(number), f"{name}\0\1Geometry", "Mesh"), inner))
+        objects.append(("Model", (I64(10 + number), f"{name}\0\1Model", "Mesh")))
+        link(number, 10 + number)
+    objects.append(("Deformer", (I64(30), "b\0\1Deformer", "BlendShape")))
+    link(30, 1)
+    for number, (name, delta) in enumerate(shapes.items(), 40):
+        moved = np.flatnonzero(np.any(delta, axis=1)).astype("<i4")
+        inner = [("Indexes", (moved,)), ("Vertices", (np.ascontiguousarray(delta[moved]).ravel(),))]
+        channel = I64(number), f"{name}\0\1SubDeformer", "BlendShapeChannel"
+        objects.append(("Deformer", channel, [("FullWeights", (np.array([100.0]),))]))
+        objects.append(("Geometry", (I64(number + 50), f"{name}\0\1Geometry", "Shape"), inner))
+        link(number, 30)
+        link(number + 50, number)
+    for number, (name, models) in enumerate({"Skin": [11, 12], "Iris": [12]}.items(), 20):
+        objects.append(("Material", (I64(number), f"{name}\0\1Material", "")))
+        for model in models:
+            link(number, model)
+    file = [("RelativeFilename", ("C:\\skins\\skin.png",))]
+    objects.append(("Texture", (I64(22), "t\0\1Texture", ""), file))
+    objects.append(("Video", (I64(23), "v\0\1Video", "Clip"), [("Content", (picture,))]))
+    link(22, 20, "DiffuseColor")
+    if embedded:
+        link(23, 22)
+    path.write_bytes(fbx([("Objects", (), objects), ("Connections", (), links)]))
+
+
+@pytest.mark.parametrize("embedded", [True, False])
+def test_an_fbx_has_all_its_meshes_and_their_textures(embedded, tmp_path):
+    picture = png(np.zeros((4, 4)))
+    path = tmp_path / "head.fbx"
+    fbx_head(path, picture, embedded=embedded)
+    found = read(path)
+    names = [n.removesuffix("_lod0_mesh") for n in found.dna.mesh_names]
+    assert names == ["head", "eyeLeft", "eyeRight"]
+    assert list(found.dna.joint_names)[2:] == EYES
+    assert np.ptp(centimetres(found.dna)[:, 1]) == pytest.approx(25, abs=0.1)
+    looks = [found.materials[n].name for n in found.dna.mesh_names]
+    assert looks == ["Skin", "Skin", "Iris"]  # the second half of the eyes is the right one
+    skin = found.materials["head_lod0_mesh"]
+    if embedded:
+        assert skin.pictures == {"color": picture}
+        return
+    assert "its color texture is left out: skin.png was not found beside the FBX" in skin.notes[0]
+    (tmp_path / "textures").mkdir()
+    (tmp_path / "textures" / "skin.png").write_bytes(picture)
+    assert read(path).materials["head_lod0_mesh"].pictures == {"color": picture}
 
 
 def test_a_jaw_shape_that_moves_nothing_leaves_the_mouth_to_a_vowel(tmp_path):

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..geometry.skeleton import Doubles, Ints
 from ..input.obj import ObjMesh
+from .parts import HeadPart, Material, taken_apart
 
 _ROUND = 0.12  # of the radius: how far the vertices of a ball may lie off in the mean
 
@@ -40,6 +42,32 @@ def islands_of(mesh: ObjMesh) -> Ints:
                 break
             label = new
     return np.unique(label, return_inverse=True)[1].ravel()
+
+
+def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[HeadPart]:
+    """A mesh, or its islands by the material that most of their polygons have: no island is cut.
+
+    Args:
+        part: the mesh.
+        of_face: int64[polygons], which of the materials each has.
+        looks: the materials.
+    """
+    used = np.unique(of_face)
+    if len(used) < 2 or len(of_face) != len(part.mesh.faces):
+        part.material = looks[int(np.bincount(of_face).argmax())] if len(used) else None
+        return [part]
+    islands = islands_of(part.mesh)
+    first = np.array([face[0] for face in part.mesh.faces])
+    counts = np.zeros((int(islands.max()) + 1, len(looks)))
+    np.add.at(counts, (islands[first], of_face), 1)
+    best = counts.argmax(axis=1)[islands]
+    out: list[HeadPart] = []
+    for place in np.unique(best[first]).tolist():
+        name = f"{part.source}_{looks[place].name}" if out else part.name
+        for piece in taken_apart(part, [name], np.where(best == place, 0, -1)):
+            piece.material = looks[place]
+            out.append(piece)
+    return out
 
 
 def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:

@@ -234,7 +234,7 @@ class _Joining:
             still.append(part)
 
     def _opening(self) -> Doubles | None:
-        """What opens the mouth: the jaw's own shape, or a wide vowel; some files have empty ones."""
+        """What opens the mouth: the jaw's shape, or a wide vowel, if it moves anything."""
         named = [n for n, controls in self.became.controls.items() if controls == ["jawOpen"]]
         meant = {expression: name for name, expression in self.became.expressions.items()}
         named += [meant[vowel] for vowel in _VOWELS if vowel in meant]

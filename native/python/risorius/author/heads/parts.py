@@ -34,6 +34,17 @@ class Material:
     notes: list[str] = field(default_factory=list)
 
 
+def as_stored(linear: Sequence[float]) -> tuple[float, float, float, float]:
+    """A colour as pictures have it, of one that is proportional to light.
+
+    Args:
+        linear: red, green, blue and opacity.
+    """
+    light = np.clip(np.array(linear, np.float64), 0.0, 1.0)
+    coded = np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return float(coded[0]), float(coded[1]), float(coded[2]), float(light[3])
+
+
 @dataclass
 class HeadPart:
     """A mesh of a head, or a part of one.

@@ -19,7 +19,7 @@ from ...importing.errors import AnimationFileError
 from ...importing.gltf import Document
 from ...importing.source import read_bytes
 from ..geometry.skeleton import Doubles
-from ..heads.parts import HeadPart, Material, used_alone
+from ..heads.parts import HeadPart, Material, as_stored, used_alone
 from . import gltf
 from .obj import ObjMesh, ShapeFileError
 
@@ -154,7 +154,7 @@ def _material(document: Document, number: int, known: dict[int, Material]) -> Ma
         rough: Mapping[str, Any] = own if isinstance(own, dict) else {}
         factor = rough.get("baseColorFactor")
         if isinstance(factor, list) and len(factor) == 4 and _all_numbers(factor):
-            out.color = _as_stored(factor)
+            out.color = as_stored(factor)
         uses = {"color": rough.get("baseColorTexture"), "normal": row.get("normalTexture"),
                 "orm": rough.get("metallicRoughnessTexture")}  # fmt: skip
         for role, use in uses.items():
@@ -165,13 +165,6 @@ def _material(document: Document, number: int, known: dict[int, Material]) -> Ma
 
 def _all_numbers(values: list[Any]) -> bool:
     return all(isinstance(v, int | float) and -1e9 < v < 1e9 for v in values)
-
-
-def _as_stored(linear: list[float]) -> tuple[float, float, float, float]:
-    """A colour as pictures have it, of one that is proportional to light."""
-    light = np.clip(np.array(linear, np.float64), 0.0, 1.0)
-    coded = np.where(light < 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return float(coded[0]), float(coded[1]), float(coded[2]), float(light[3])
 
 
 def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Material) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from ...controls import vocabulary
 from ..heads.parts import HeadPart
 from .matching import guess
+from .mtl import with_materials
 from .obj import ObjMesh, ShapeFileError, read_obj, read_positions
 from .welding import welded
 
@@ -48,14 +49,14 @@ def read_obj_head(neutral: Path, folder: Path, *, others: bool) -> list[HeadPart
     """
     mesh = read_obj(neutral)
     face = HeadPart(neutral.stem, mesh, source=neutral.stem)
-    out = [face]
+    out: list[HeadPart] = []
     for path in sorted(folder.glob("*.obj")):
         if os.path.realpath(path) == os.path.realpath(neutral):  # a loop of links is none
             continue
         if others and not _is_known(path.stem):
             other = _other(path, len(mesh.positions))
             if other is not None:
-                out.append(HeadPart(path.stem, other, source=path.stem))
+                out.extend(with_materials(path, HeadPart(path.stem, other, source=path.stem)))
                 continue
         face.shapes[path.stem] = read_positions(path, len(mesh.positions)) - mesh.positions
     if not face.shapes:
@@ -64,7 +65,7 @@ def read_obj_head(neutral: Path, folder: Path, *, others: bool) -> list[HeadPart
         )
     face.mesh, moved = welded(mesh, list(face.shapes.values()))
     face.shapes = dict(zip(face.shapes, moved, strict=True))
-    return out
+    return [*with_materials(neutral, face), *out]
 
 
 def _is_known(name: str) -> bool:

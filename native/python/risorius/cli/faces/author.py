@@ -137,6 +137,8 @@ def run(args: argparse.Namespace) -> int:
     if not args.json:
         more = [*about_library(became, library_folder(args.out)), *textures.notes]
         said = "\n".join([said, *more])
+    else:
+        print("\n".join(textures.notes), end="\n" if textures.notes else "", file=sys.stderr)
     if args.report is not None:
         files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
     fileio.write_all(files)  # the page last of what can fail: there is no face without it
