@@ -15,6 +15,7 @@ namespace {
 using core::ErrorCode;
 
 constexpr std::size_t kLargestStride = 256;
+constexpr std::uint32_t kMostVertices = 1u << 30;  // steps from one to another have 30 bits
 constexpr std::size_t kMostCount = std::size_t{1} << 31;
 // A block of 256 rows takes a byte for each 4 of a row's at least, a triangle takes one.
 constexpr std::size_t kMostRowBytesPerByte = 1024;
@@ -141,7 +142,13 @@ core::Result<std::vector<std::uint8_t>> pack(std::span<const std::uint8_t> rows,
     return out;
   }
   const std::vector<std::uint32_t> corners = corners_of(rows, packing.stride);
-  const std::size_t vertices = std::size_t{1} + *std::max_element(corners.begin(), corners.end());
+  const std::uint32_t most = *std::max_element(corners.begin(), corners.end());
+  if (most >= kMostVertices) {
+    return core::fail(ErrorCode::kInvalidValue, "",
+                      "corners below " + std::to_string(kMostVertices) + " were expected, found " +
+                          std::to_string(most));
+  }
+  const std::size_t vertices = std::size_t{1} + most;
   const bool triangles = packing.mode == PackedMode::kTriangles;
   out.resize(triangles ? meshopt_encodeIndexBufferBound(corners.size(), vertices)
                        : meshopt_encodeIndexSequenceBound(corners.size(), vertices));

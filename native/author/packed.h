@@ -36,7 +36,8 @@ core::Result<std::vector<std::uint8_t>> unpack(std::span<const std::uint8_t> pac
 /// Bytes that unpack, and every reader of the extension, gives back; triangles may come with their
 /// corners turned. With a filter the rows are those of `filtered`.
 /// In: rows  count * stride bytes
-/// Fails: kInvalidArgument as unpack, kInvalidLength (rows)
+/// Fails: kInvalidArgument as unpack, kInvalidLength (rows), kInvalidValue (a corner of 2^30 or
+/// more)
 core::Result<std::vector<std::uint8_t>> pack(std::span<const std::uint8_t> rows,
                                              const Packing& packing);
 

@@ -8,6 +8,7 @@ import pytest
 from glb_files import SCALE, SHIFT, TURN, egg, world
 from risorius.author.input import gltf
 from risorius.author.input.obj import ShapeFileError
+from risorius.base.budget import BudgetError
 from risorius.importing.errors import AnimationFileError
 
 
@@ -131,6 +132,14 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
     assert "accessors[a number of 401 digits] was expected, there are" in said(
         lambda j: j["meshes"][0]["primitives"][0].update(indices=10**400)
     )
+
+    def crowd(document):
+        """Primitives that share all their vertices and have no indices."""
+        document["accessors"].append({"type": "VEC3", "componentType": 5126, "count": 99_999})
+        shape = {"POSITION": len(document["accessors"]) - 1}
+        document["meshes"][0]["primitives"] = [{"attributes": shape, "targets": [shape]}] * 4000
+
+    assert "bytes more than the" in said(crowd, BudgetError)
     assert "nodes[1]: it hangs on itself" in said(lambda j: j["nodes"][1].update(children=[0]))
     assert "componentType: one of 5120, 5121, 5122, 5123, 5126 was expected, found 5125" in said(
         accessor(0, componentType=5125)

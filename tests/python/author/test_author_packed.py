@@ -184,6 +184,15 @@ def test_what_is_packed_badly_is_one_sentence(tmp_path):
     )
 
 
+def test_texture_coordinates_that_no_picture_has_are_one_sentence(tmp_path):
+    def far(document):
+        texture = document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+        texture["extensions"]["KHR_texture_transform"].update(scale=[1e30, 1e30])
+
+    with pytest.raises(RisoriusError, match=r"TEXCOORD_0: texture coordinates up to 1e\+06 were"):
+        read_gltf(head(tmp_path / "odd.glb", packed=True, change=far))
+
+
 def test_damaged_bytes_are_refused_or_read(tmp_path):
     """Bytes that are changed anywhere, and files that are cut: nothing but our errors."""
     whole = head(tmp_path / "whole.glb", packed=True).read_bytes()

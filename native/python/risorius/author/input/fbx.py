@@ -254,33 +254,48 @@ def _to_world(scene: Scene, mesh: int) -> Doubles:
     """float64[4, 4] of a mesh' node and of all above it, or of its skin, column vectors."""
     at = _model_of(scene, mesh)
     out = _geometric(scene, scene.objects[at]) if at else np.eye(4)
-    bound = _bound(scene, mesh)
-    return (_chain(scene, at)[1] if bound is None else bound) @ out
+    joint = _top_joint(scene, mesh)
+    if joint is None:
+        return _product(scene, _chain(scene, at)) @ out
+    stands, place = joint
+    return _product(scene, stands) @ place @ out
 
 
-def _chain(scene: Scene, node: int) -> tuple[int, Doubles]:
-    """How many nodes are above a node and itself, and float64[4, 4] what all of them do."""
-    out, depth = np.eye(4), 0
-    while node and depth < _DEEPEST:
+def _chain(scene: Scene, node: int) -> list[int]:
+    """A node and all above it, the root last."""
+    out: list[int] = []
+    while node and len(out) < _DEEPEST:
+        out.append(node)
+        node = _model_of(scene, node)
+    return out
+
+
+def _product(scene: Scene, chain: Sequence[int]) -> Doubles:
+    """float64[4, 4] from the first of these nodes to the world."""
+    out = np.eye(4)
+    for node in chain:
         out = _local(scene, scene.objects[node]) @ out
-        node, depth = _model_of(scene, node), depth + 1
-    return depth, out
+    return out
 
 
-def _bound(scene: Scene, mesh: int) -> Doubles | None:
-    """float64[4, 4] of a skinned mesh as it was bound, where the joint that is nearest to the root
-    stands, whatever its own node and other joints do; None: no skin says how."""
-    nearest, out = _DEEPEST + 1, None
+def _top_joint(scene: Scene, mesh: int) -> tuple[list[int], Doubles] | None:
+    """The joint of a mesh' skin that is nearest to the root, with all above it, and float64[4, 4]
+    where that joint had the mesh when it was bound; None: no skin says it. The mesh' own node and
+    other joints may stand anywhere."""
+    found: tuple[list[int], Node] | None = None
     for skin, _ in _below(scene, mesh, "Deformer", "Skin"):
         for cluster, node in _below(scene, skin, "Deformer", "Cluster"):
-            place = _numbers(scene, node, "Transform")  # of the mesh, as the joint sees it
             joints = [n for n in scene.children.get(cluster, []) if _is_model(scene, n)]
-            if place.size != 16 or not joints:
+            if node.length("Transform") != 16 or not joints:
                 continue
-            depth, stands = _chain(scene, joints[0])
-            if depth < nearest:
-                nearest, out = depth, stands @ place.reshape(4, 4).T.astype(np.float64)
-    return out
+            chain = _chain(scene, joints[0])
+            scene.budget.work(len(chain), "joints")
+            if found is None or len(chain) < len(found[0]):
+                found = chain, node
+    if found is None:
+        return None
+    place = _numbers(scene, found[1], "Transform")
+    return found[0], place.reshape(4, 4).T.astype(np.float64)
 
 
 def _is_model(scene: Scene, number: int) -> bool:
@@ -303,11 +318,18 @@ def _local(scene: Scene, node: Node) -> Doubles:
     read = _Transforms(scene, node)
     pivot, scaled = read.shift("RotationPivot"), read.shift("ScalingPivot")
     turned = read.turn("PreRotation") @ read.turn("Lcl Rotation", read.order())
-    turned = turned @ np.linalg.inv(read.turn("PostRotation"))
+    turned = turned @ read.turn("PostRotation").T
     out = read.shift("Lcl Translation") @ read.shift("RotationOffset")
-    out = out @ pivot @ turned @ np.linalg.inv(pivot)
-    sized = scaled @ read.size("Lcl Scaling") @ np.linalg.inv(scaled)
+    out = out @ pivot @ turned @ _back(pivot)
+    sized = scaled @ read.size("Lcl Scaling") @ _back(scaled)
     return out @ read.shift("ScalingOffset") @ sized
+
+
+def _back(shift: Doubles) -> Doubles:
+    """The inverse of a shift. LAPACK's, of many threads, takes milliseconds on a busy machine."""
+    out = shift.copy()
+    out[:3, 3] *= -1
+    return out
 
 
 class _Transforms:

@@ -22,6 +22,9 @@ from .welding import welded
 
 SUFFIXES = (".glb", ".gltf", ".vrm")  # VRM is a GLB with a body's bones by name
 _TRIANGLES = 4
+_DEEPEST = 1024  # nodes above a mesh
+_CORNER_BYTES = 48  # of a triangle's corner in arrays and lists
+_FURTHEST_UV = 1e6
 
 
 def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
@@ -198,6 +201,7 @@ class _Part:
         elif "indices" in primitive:
             rows = document.rows(primitive["indices"], at, "SCALAR", INDICES)
             order = rows[:, 0].astype(np.int64)
+        document.budget.hold(len(order) * _CORNER_BYTES, at)
         if len(order) % 3 or (len(order) and not 0 <= order.min() <= order.max() < count):
             raise document.fail(at, f"triangles of {count} vertices were expected")
         return order.reshape(-1, 3)
@@ -276,6 +280,12 @@ def _uvs(
     cos, sin = float(np.cos(angle[0])), float(np.sin(angle[0]))
     found = found @ np.array([[cos, -sin], [sin, cos]])
     found = found + _numbers(document, change, "offset", [0.0, 0.0], place)
+    if not np.abs(found).max(initial=0.0) <= _FURTHEST_UV:
+        raise document.fail(
+            f"primitives.attributes.{name}",
+            f"texture coordinates up to {_FURTHEST_UV:g} were expected, found "
+            f"{np.abs(found).max():g}",
+        )
     return np.stack([found[:, 0], 1 - found[:, 1]], axis=1)  # v points down there
 
 
@@ -335,6 +345,7 @@ class _World:
         self._document = document
         nodes = document.json.get("nodes")
         self.rows: list[dict[str, Any]] = nodes if isinstance(nodes, list) else []
+        document.budget.work(len(self.rows), "nodes")
         self._parents: dict[int, int] = {}
         for number, node in enumerate(self.rows):
             if not isinstance(node, dict):
@@ -353,8 +364,9 @@ class _World:
         out = [node]
         while out[-1] in self._parents:
             out.append(self._parents[out[-1]])
-            if len(out) > len(self.rows):
-                raise self._document.fail(f"nodes[{node}]", "it hangs on itself")
+            if len(out) > _DEEPEST:
+                what = f"it hangs on itself, or below more than {_DEEPEST} nodes"
+                raise self._document.fail(f"nodes[{node}]", what)
         return out
 
     def matrix(self, node: int) -> Doubles:
