@@ -132,6 +132,11 @@ def test_lower_teeth_and_tongue_go_with_the_jaw_and_the_rest_stays(tmp_path):
     only = likenesses.mesh("Head", (points, faces), {"viseme_aa": shapes["jawOpen"]})
     spoken = read(saved(tmp_path, [only, *made("Face Cap")[2:3]]))
     assert np.abs(moved(spoken.dna, "teethLower", "viseme_aa")[1] - opened).max() < 0.05
+    whole, *others = made("Face Cap")
+    flat = [{**m, "faces": m["faces"][: 5 if m["name"] == "teeth" else 0]} for m in others]
+    some = read(saved(tmp_path, [whole, *flat]))
+    assert len(some.dna.meshes) == 2
+    assert "eyes is left out: it has no polygons" in some.odd
     lines = {"teethLower hangs on the jaw", "teethUpper hangs on the head",
              "tongue hangs on the jaw", "glasses hangs on the head"}  # fmt: skip
     assert lines <= set(found.odd)

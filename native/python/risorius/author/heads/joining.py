@@ -92,9 +92,8 @@ def join(
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")
     if wrong:
         raise ShapeFileError(f"{where}: source: {wrong}")
-    face = choose_face(
-        where, [p for p in parts if len(p.mesh.positions)], wishes.mesh, wishes.rather
-    )
+    able = [part for part in parts if part.mesh.faces]
+    face = choose_face(where, able, wishes.mesh, wishes.rather)
     return _Joining(face, parts, unit, wishes, edited, axes).made()
 
 
@@ -112,9 +111,11 @@ class _Joining:
         self.notes: list[str] = []
         others, twins = [], []
         for part in parts:
-            if part is face or not len(part.mesh.positions):
+            if part is face:
                 continue
-            if part.source == face.source and moves(part):
+            if not part.mesh.faces:
+                self.notes.append(f"{part.name} is left out: it has no polygons")
+            elif part.source == face.source and moves(part):
                 twins.append(part)  # another material of the same mesh
             elif moves(part) and is_other_head(face, part):
                 self.notes.append(f"{part.name} is left out: it is another head")
@@ -238,7 +239,8 @@ class _Joining:
         named = [n for n, controls in self.became.controls.items() if controls == ["jawOpen"]]
         meant = {expression: name for name, expression in self.became.expressions.items()}
         named += [meant[vowel] for vowel in _VOWELS if vowel in meant]
-        return next((self.face.shapes[n] for n in named if n in self.face.shapes), None)
+        found = (self.face.shapes[name] for name in named if name in self.face.shapes)
+        return next((delta for delta in found if delta.any()), None)
 
     def _lids(self) -> dict[str, Doubles]:
         """The middle of what a blink moves, by side."""
