@@ -20,7 +20,7 @@ from .sorting import FACE, JAW, Places, choose_face, hung, is_coarse, is_other_h
 from .turning import Eye, Turn, eye_turn, jaw_turn, take_eyes
 
 _OFF = 0.1  # of the width: a face that is further from x = 0 is moved there
-_TOLD_MM = 1.0
+_TOLD = 0.1  # of an eye's radius: what its shapes do beside turning it
 _VOWELS = ("aa", "oh", "E")  # expressions that open the mouth, the widest first
 
 
@@ -109,6 +109,7 @@ class _Joining:
     ) -> None:
         self.unit, self.wishes, self.edited, self.axes = unit, wishes, edited, axes
         self.notes: list[str] = []
+        self.away: dict[str, str] = {}  # meshes that are left out, or parts of them: why
         others, twins = [], []
         for part in parts:
             if part is face:
@@ -140,6 +141,11 @@ class _Joining:
         moving, still = [self.face], list[HeadPart]()
         for part in self.others:
             self._sort(part, places, moving, still)
+        taken = {part.source for part in (*moving, *still)}
+        self.notes.extend(
+            f"{'a part of ' if source in taken else ''}{source} is left out: {why}"
+            for source, why in self.away.items()
+        )
         self.became = self._assigned(moving)
         rest, eyes = take_eyes([*moving, *still], height, self._lids())
         turns = [self._eye(eye) for eye in eyes]
@@ -147,6 +153,8 @@ class _Joining:
         for part in rest:
             if part.shapes and moves(part):
                 hanging.insert(0, (part, FACE))
+                if part.source != self.face.source:
+                    self.notes.append(said_of(part, FACE, part.shapes))
             else:
                 pieces = hung(part, places)
                 hanging.extend(pieces)
@@ -227,10 +235,8 @@ class _Joining:
         away = places.away(part)
         if part.shapes and (alike or not away):
             moving.append(part)
-            if part.source != self.face.source:
-                self.notes.append(said_of(part, FACE, part.shapes))
         elif away:
-            self.notes.append(f"{part.name} is left out: {away}")
+            self.away.setdefault(part.source, away)
         else:
             still.append(part)
 
@@ -256,8 +262,7 @@ class _Joining:
 
     def _eye(self, eye: Eye) -> Turn:
         turn, left = eye_turn(eye, self.became.controls)
-        mm = UNITS[self.unit]
-        far = [name for name, off in left.items() if off * mm > _TOLD_MM]
+        far = [name for name, off in left.items() if off > _TOLD * eye.ball.radius]
         names = ", ".join(dict.fromkeys(part.source or part.name for part in eye.parts))
         side = "left" if eye.side == "L" else "right"
         self.notes.append(f"{names}: the {side} eye turns with the look controls")
