@@ -331,6 +331,7 @@ def test_names_of_one_meaning_move_together_and_nameless_heads_stand(tmp_path):
     dna = read(saved(tmp_path, meshes)).dna
     assert len(target(dna, "eyeBlinkL", 1)[0]) == len(lashes[0])
     assert "Zz" in list(dna.blend_shape_channel_names)
+    assert list(dna.mesh_names)[1] == "eyelashes_lod0_mesh"
     unknown = {f"shape {i}": delta for i, delta in enumerate(shapes.values())}
     for names in (unknown, {"viseme_aa": shapes["jawOpen"], "viseme_PP": shapes["mouthSmileLeft"]}):
         head = likenesses.mesh("Head", (points, faces), names)

@@ -21,6 +21,8 @@ from .turning import Eye, Turn, eye_turn, jaw_turn, take_eyes
 
 _OFF = 0.1  # of the width: a face that is further from x = 0 is moved there
 _TOLD = 0.1  # of an eye's radius: what its shapes do beside turning it
+_CALLED = ((re.compile(r"lash|eyeline", re.IGNORECASE), "eyelashes"),
+           (re.compile(r"brow", re.IGNORECASE), "eyebrows"))  # fmt: skip
 _VOWELS = ("aa", "oh", "E")  # expressions that open the mouth, the widest first
 
 
@@ -340,7 +342,9 @@ def _moved(part: HeadPart, turn: Doubles, shift: Doubles | None = None, order: i
 
 
 def _label(name: str, taken: set[str]) -> str:
-    """A mesh name in letters that every reader takes, each once."""
+    """A mesh name in letters that every reader takes, each once; lashes and brows by the words that
+    readers know."""
+    name = next((word for found, word in _CALLED if found.search(name)), name)
     plain = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_") or "part"
     number, out = 1, plain
     while out.lower() in taken:
