@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.words import joined
 from ..geometry.skeleton import Doubles, Ints
 from ..input.obj import ObjMesh
 from .parts import HeadPart, Material, taken_apart
@@ -54,7 +55,9 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
     """
     used = np.unique(of_face)
     if len(used) < 2 or len(of_face) != len(part.mesh.faces):
-        part.material = looks[int(np.bincount(of_face).argmax())] if len(used) else None
+        most = int(np.bincount(of_face).argmax()) if len(used) else 0
+        part.material = looks[most] if len(used) else None
+        _tell(part, looks, set(used.tolist()) - {most})
         return [part]
     islands = islands_of(part.mesh)
     first = np.array([face[0] for face in part.mesh.faces])
@@ -67,7 +70,18 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
         for piece in taken_apart(part, [name], np.where(best == place, 0, -1)):
             piece.material = looks[place]
             out.append(piece)
+    _tell(out[0], looks, set(used.tolist()) - set(best[first].tolist()))
     return out
+
+
+def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
+    """A sentence where materials with pictures are left out."""
+    names = [looks[place].name for place in sorted(lost) if looks[place].pictures]
+    if names and part.material is not None:
+        part.material.notes.append(
+            f"{part.source}: {joined(names)} left out: polygons of other materials are joined to "
+            "theirs, and a mesh has one"
+        )
 
 
 def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:
@@ -90,7 +104,7 @@ def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None
     lengths = np.linalg.norm(own - middle, axis=1)
     radius = float(lengths.mean())
     extent = np.ptp(own, axis=0)
-    whole = extent.max() >= 1.2 * radius and extent.min() >= 0.5 * radius
+    whole = extent.max() >= 1.2 * radius and extent.min() >= 0.8 * radius
     if not whole or lengths.std() > off * radius:
         return None
     return Ball(vertices, np.asarray(middle), radius)

@@ -20,7 +20,9 @@ from .sorting import FACE, JAW, Places, choose_face, hung, is_coarse, is_other_h
 from .turning import Eye, Turn, eye_turn, jaw_turn, take_eyes
 
 _OFF = 0.1  # of the width: a face that is further from x = 0 is moved there
-_TOLD_MM = 1.0
+_TOLD = 0.1  # of an eye's radius: what its shapes do beside turning it
+_CALLED = ((re.compile(r"lash|eyeline", re.IGNORECASE), "eyelashes"),
+           (re.compile(r"brow", re.IGNORECASE), "eyebrows"))  # fmt: skip
 _VOWELS = ("aa", "oh", "E")  # expressions that open the mouth, the widest first
 
 
@@ -92,9 +94,8 @@ def join(
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")
     if wrong:
         raise ShapeFileError(f"{where}: source: {wrong}")
-    face = choose_face(
-        where, [p for p in parts if len(p.mesh.positions)], wishes.mesh, wishes.rather
-    )
+    able = [part for part in parts if part.mesh.faces]
+    face = choose_face(where, able, wishes.mesh, wishes.rather)
     return _Joining(face, parts, unit, wishes, edited, axes).made()
 
 
@@ -110,11 +111,14 @@ class _Joining:
     ) -> None:
         self.unit, self.wishes, self.edited, self.axes = unit, wishes, edited, axes
         self.notes: list[str] = []
+        self.away: dict[str, str] = {}  # meshes that are left out, or parts of them: why
         others, twins = [], []
         for part in parts:
-            if part is face or not len(part.mesh.positions):
+            if part is face:
                 continue
-            if part.source == face.source and moves(part):
+            if not part.mesh.faces:
+                self.notes.append(f"{part.name} is left out: it has no polygons")
+            elif part.source == face.source and moves(part):
                 twins.append(part)  # another material of the same mesh
             elif moves(part) and is_other_head(face, part):
                 self.notes.append(f"{part.name} is left out: it is another head")
@@ -139,6 +143,11 @@ class _Joining:
         moving, still = [self.face], list[HeadPart]()
         for part in self.others:
             self._sort(part, places, moving, still)
+        taken = {part.source for part in (*moving, *still)}
+        self.notes.extend(
+            f"{'a part of ' if source in taken else ''}{source} is left out: {why}"
+            for source, why in self.away.items()
+        )
         self.became = self._assigned(moving)
         rest, eyes = take_eyes([*moving, *still], height, self._lids())
         turns = [self._eye(eye) for eye in eyes]
@@ -146,6 +155,8 @@ class _Joining:
         for part in rest:
             if part.shapes and moves(part):
                 hanging.insert(0, (part, FACE))
+                if part.source != self.face.source:
+                    self.notes.append(said_of(part, FACE, part.shapes))
             else:
                 pieces = hung(part, places)
                 hanging.extend(pieces)
@@ -226,20 +237,18 @@ class _Joining:
         away = places.away(part)
         if part.shapes and (alike or not away):
             moving.append(part)
-            if part.source != self.face.source:
-                self.notes.append(said_of(part, FACE, part.shapes))
         elif away:
-            self.notes.append(f"{part.name} is left out: {away}")
+            self.away.setdefault(part.source, away)
         else:
             still.append(part)
 
     def _opening(self) -> Doubles | None:
-        """What opens the mouth: the jaw's shape, or a wide vowel, if it moves anything."""
+        """What opens the mouth: the jaw's own shape, or a wide vowel."""
         named = [n for n, controls in self.became.controls.items() if controls == ["jawOpen"]]
         meant = {expression: name for name, expression in self.became.expressions.items()}
         named += [meant[vowel] for vowel in _VOWELS if vowel in meant]
-        shapes = (self.face.shapes[n] for n in named if n in self.face.shapes)
-        return next((shape for shape in shapes if shape.any()), None)
+        found = (self.face.shapes[name] for name in named if name in self.face.shapes)
+        return next((delta for delta in found if delta.any()), None)
 
     def _lids(self) -> dict[str, Doubles]:
         """The middle of what a blink moves, by side."""
@@ -255,8 +264,7 @@ class _Joining:
 
     def _eye(self, eye: Eye) -> Turn:
         turn, left = eye_turn(eye, self.became.controls)
-        mm = UNITS[self.unit]
-        far = [name for name, off in left.items() if off * mm > _TOLD_MM]
+        far = [name for name, off in left.items() if off > _TOLD * eye.ball.radius]
         names = ", ".join(dict.fromkeys(part.source or part.name for part in eye.parts))
         side = "left" if eye.side == "L" else "right"
         self.notes.append(f"{names}: the {side} eye turns with the look controls")
@@ -334,7 +342,9 @@ def _moved(part: HeadPart, turn: Doubles, shift: Doubles | None = None, order: i
 
 
 def _label(name: str, taken: set[str]) -> str:
-    """A mesh name in letters that every reader takes, each once."""
+    """A mesh name in letters that every reader takes, each once; lashes and brows by the words that
+    readers know."""
+    name = next((word for found, word in _CALLED if found.search(name)), name)
     plain = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_") or "part"
     number, out = 1, plain
     while out.lower() in taken:

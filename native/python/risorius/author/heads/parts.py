@@ -119,14 +119,6 @@ def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
     return out
 
 
-def used_alone(part: HeadPart) -> HeadPart:
-    """A part without the vertices that no polygon has."""
-    labels = np.ones(len(part.mesh.positions), np.int64)
-    for face in part.mesh.faces:
-        labels[face] = 0
-    return taken_apart(part, [part.name], labels)[0] if labels.any() else part
-
-
 def taken_apart(part: HeadPart, names: Sequence[str], labels: Ints) -> list[HeadPart]:
     """A part divided: its vertices by label, in the order of the labels; none is shared.
 

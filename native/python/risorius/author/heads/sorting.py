@@ -153,8 +153,8 @@ def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
     )  # fmt: skip
     if low.all() or not low.any():
         return [(part, JAW if low.all() else HEAD)]
-    upper, lower = taken_apart(part, [f"{name}Upper", f"{name}Lower"], low[islands].astype(int))
-    return [(upper, HEAD), (lower, JAW)]
+    pieces = taken_apart(part, [f"{name}Upper", f"{name}Lower"], low[islands].astype(int))
+    return [(piece, JAW if piece.name == f"{name}Lower" else HEAD) for piece in pieces]
 
 
 def said_of(part: HeadPart, joint: str, shapes: Mapping[str, Doubles]) -> str:

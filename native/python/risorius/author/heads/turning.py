@@ -19,10 +19,13 @@ from .parts import HeadPart, taken_apart
 _LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
           "eyeLookRight": (0, -30)}  # fmt: skip
 _EYE = re.compile(r"eye|iris|pupil|sclera|cornea", re.IGNORECASE)
-_BESIDE = re.compile(r"lash|brow|lid|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
+_BESIDE = re.compile(r"lash|brow|lid|eyeline|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
+_NAMED_ROUND = 0.18  # of the radius, of what is called an eye: corneas bulge
 _SIZES = (0.02, 0.16)  # radius, of the face's height
 _INSIDE = 1.1  # of the radius: what lies within turns with the eye
+_NONE = np.zeros(0, np.int64)
 _LEAST_ANGLE = 0.03  # radians: what turns an eye less is none
+_NO_TURN = 0.4  # of a shape's motion: what leaves more of it when an eye turns is no turn
 _HELD, _CHIN = 0.7, 0.4  # of the jaw's motion, of its lowest: what is rigid there
 _FOLLOWS = 0.05  # of the jaw's motion
 
@@ -74,12 +77,11 @@ def take_eyes(
     pair = _pair(parts, found, lids)
     if pair is None:
         return list(parts), []
-    eyes = [Eye(side, ball, []) for side, ball in zip("LR", pair, strict=True)]
+    eyes = [Eye(side, ball, []) for side, (_, ball) in zip("LR", pair, strict=True)]
     rest = []
-    for part, islands in zip(parts, labels, strict=True):
-        rest.extend(_divided(part, islands, eyes))
-    if not all(eye.parts for eye in eyes):  # a shell that is a part of no ball, as painted eyes are
-        return list(parts), []
+    for number, (part, islands) in enumerate(zip(parts, labels, strict=True)):
+        own = [ball.vertices[:1] if at == number else _NONE for at, ball in pair]
+        rest.extend(_divided(part, islands, eyes, own))
     return rest, eyes
 
 
@@ -93,7 +95,7 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
     for own in np.split(order, np.cumsum(np.bincount(islands))[:-1]):
         if len(own) < 12 or np.ptp(points[own], axis=0).max() > 4 * _SIZES[1] * height:
             continue
-        ball = ball_of(points, own, 0.3) if named else ball_of(points, own)
+        ball = ball_of(points, own, _NAMED_ROUND) if named else ball_of(points, own)
         if ball is not None and _SIZES[0] * height < ball.radius < _SIZES[1] * height:
             out.append(ball)
     return out
@@ -101,9 +103,9 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
 
 def _pair(
     parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
-) -> tuple[Ball, Ball] | None:
-    """The largest two balls that may be the left and the right eye."""
-    best: tuple[tuple[bool, float], tuple[Ball, Ball]] | None = None
+) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
+    """The largest two balls that may be the left and the right eye, and the part of each."""
+    best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
     for i, left in found:
         for j, right in found:
             if left.middle[0] <= right.middle[0] or left is right:
@@ -121,16 +123,19 @@ def _pair(
                 continue
             key = (named, radius)
             if best is None or key > best[0]:
-                best = key, (left, right)
-    return best[1] if best else None
+                best = key, (i, left), (j, right)
+    return best[1:] if best else None
 
 
 def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
     return lid is None or bool(np.linalg.norm(ball.middle - lid) < 3 * ball.radius)
 
 
-def _divided(part: HeadPart, islands: Ints, eyes: Sequence[Eye]) -> list[HeadPart]:
-    """What is left of a part when its islands in the eyes' balls are theirs."""
+def _divided(
+    part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
+) -> list[HeadPart]:
+    """What is left of a part when its islands in the eyes' balls are theirs; own: a vertex of each
+    ball, where it is of this part."""
     if _BESIDE.search(part.name):
         return [part]
     count = int(islands.max()) + 1
@@ -140,9 +145,10 @@ def _divided(part: HeadPart, islands: Ints, eyes: Sequence[Eye]) -> list[HeadPar
         furthest = np.zeros(count)
         np.maximum.at(furthest, islands, away)
         reach = _INSIDE * eye.ball.radius
-        if len(eye.ball.vertices) and _EYE.search(part.name):
+        if _EYE.search(part.name):
             reach *= 1.2  # a cornea that bulges
         of_island[furthest < reach] = number
+        of_island[islands[own[number]]] = number
     if (of_island == 2).all():
         return [part]
     out: list[HeadPart] = []
@@ -173,15 +179,17 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
         )
         if np.abs(delta).max() < 1e-4 * eye.ball.radius:
             continue
-        rotation, _ = rigid_fit(points, points + delta)
+        rotation, moved = rigid_fit(points, points + delta)
         angle = float(np.linalg.norm(sk.rotation_vectors(rotation)))
         every = controls.get(name, ())
         own = [control for control in every if control.endswith(eye.side) or len(every) == 1]
         arm = points - eye.ball.middle
-        if angle > _LEAST_ANGLE and own:
-            turn.motions.setdefault(own[0], (rotation, np.zeros(3)))
-            rest = delta - (arm @ rotation.T - arm)
-            left[name] = float(np.linalg.norm(rest, axis=1).max())
+        # Shapes turn an eye about a point of their own, such as a joint of the body's rig.
+        rotation, shift = about(eye.ball.middle, rotation, moved)
+        rest = _longest(delta - (arm @ rotation.T + shift - arm))
+        if angle > _LEAST_ANGLE and own and rest < _NO_TURN * _longest(delta):
+            turn.motions.setdefault(own[0], (rotation, shift))
+            left[name] = rest
         else:
             kept.append(name)
     for look, angles in _LOOKS.items():
@@ -192,6 +200,10 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
     for part in eye.parts:
         part.shapes = {name: part.shapes[name] for name in kept if name in part.shapes}
     return turn, left
+
+
+def _longest(rows: Doubles) -> float:
+    return float(np.linalg.norm(rows, axis=1).max())
 
 
 def jaw_turn(

@@ -8,7 +8,6 @@ import binascii
 import copy
 import re
 from collections.abc import Mapping
-from itertools import permutations
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -19,11 +18,11 @@ from ...importing.errors import AnimationFileError
 from ...importing.gltf import Document
 from ...importing.source import read_bytes
 from ..geometry.skeleton import Doubles
-from ..heads.parts import HeadPart, Material, as_stored, used_alone
+from ..heads.islands import divided
+from ..heads.parts import HeadPart, Material, as_stored
 from . import gltf
-from .obj import ObjMesh, ShapeFileError
+from .obj import ShapeFileError
 
-_SHARED = 0.05  # of a primitive's vertices: one that shares more with another is no part of its own
 _KINDS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
 
 
@@ -103,26 +102,21 @@ def _parts(
         kind = primitive.get("material")
         if primitive.get("mode", 4) == 4:  # points and lines are no skin
             groups.setdefault(kind if isinstance(kind, int) else -1, []).append(primitive)
-    pieces = []
-    for kind, primitives in groups.items():
-        mesh, shapes = gltf.assembled(_only(document, number, primitives), number)
-        look = _material(document, kind, materials)
-        pieces.append(HeadPart(source, mesh, shapes, look, source))
-    if len(pieces) > 1:  # primitives may share all vertices and use some
-        pieces = [used_alone(piece) for piece in pieces if piece.mesh.faces]
-    pairs = permutations((piece.mesh for piece in pieces), 2)
-    if any(_shares(one, other) for one, other in pairs):
-        everything = [primitive for group in groups.values() for primitive in group]
-        mesh, shapes = gltf.assembled(_only(document, number, everything), number)
-        look = copy.copy(max(pieces, key=lambda p: len(p.mesh.faces)).material)
-        if look is not None and any(p.material is not None and p.material.pictures for p in pieces):
-            names = ", ".join(p.material.name for p in pieces if p.material is not None)
-            look.notes = [*look.notes, f"{source}: its materials {names} share vertices: the one "
-                          f"with most polygons, {look.name}, is taken for all"]  # fmt: skip
-        return [HeadPart(source, mesh, shapes, look, source)]
-    for piece in pieces[1:] if len(pieces) > 1 else []:
-        piece.name = f"{source}_{piece.material.name if piece.material else 'other'}"
-    return pieces
+    if not groups:
+        return []
+    everything = [primitive for group in groups.values() for primitive in group]
+    mesh, shapes = gltf.assembled(_only(document, number, everything), number)
+    part = HeadPart(source, mesh, shapes, source=source)
+    looks = [_material(document, kind, materials) for kind in groups]
+    if len(looks) < 2:
+        part.material = looks[0]
+        return [part]
+    counts = [
+        len(gltf.assembled(_only(document, number, group), number)[0].faces)
+        for group in groups.values()
+    ]
+    of_face = np.repeat(np.arange(len(counts)), counts)
+    return divided(part, of_face, [look or Material("other") for look in looks])
 
 
 def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> Document:
@@ -132,15 +126,6 @@ def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> 
     meshes[number] = {**meshes[number], "primitives": primitives}
     out.json = {**document.json, "meshes": meshes}
     return out
-
-
-def _shares(one: ObjMesh, other: ObjMesh) -> bool:
-    """Whether many vertices of a mesh are those of another."""
-    rows = [
-        {row.tobytes() for row in m.positions[np.unique(np.concatenate(m.faces))].astype("<f4") + 0}
-        for m in (one, other)
-    ]
-    return len(rows[0] & rows[1]) > _SHARED * len(rows[0])
 
 
 def _material(document: Document, number: int, known: dict[int, Material]) -> Material | None:
