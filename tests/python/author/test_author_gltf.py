@@ -135,10 +135,12 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
 
     def crowd(document):
         """Primitives that share all their vertices and have no indices."""
-        document["accessors"].append({"type": "VEC3", "componentType": 5126, "count": 99_999})
-        shape = {"POSITION": len(document["accessors"]) - 1}
-        document["meshes"][0]["primitives"] = [{"attributes": shape, "targets": [shape]}] * 4000
+        shape = {"POSITION": 0}
+        document["meshes"][0]["primitives"] = [{"attributes": shape, "targets": [shape]}] * 20_000
 
+    assert "POSITION: a bufferView was expected, found none; the file requires EXT_new" in said(
+        lambda j: j.update(extensionsRequired=["EXT_new"]) or j["accessors"][0].pop("bufferView")
+    )
     assert "bytes more than the" in said(crowd, BudgetError)
     assert "nodes[1]: it hangs on itself" in said(lambda j: j["nodes"][1].update(children=[0]))
     assert "componentType: one of 5120, 5121, 5122, 5123, 5126 was expected, found 5125" in said(

@@ -238,6 +238,11 @@ class _Packed:
         """
         at = f"{self._place}.attributes.{name}"
         if self.mesh is None or name not in self._numbers:
+            accessor = self._document.item("accessors", given.get(name), at)
+            if "bufferView" not in accessor and "sparse" not in accessor:
+                needed = self._document.json.get("extensionsRequired")
+                why = f"; the file requires {_listed(needed)}" if needed else ""
+                raise self._document.fail(at, f"a bufferView was expected, found none{why}")
             return self._document.rows(given.get(name), at, kind)
         accessor = self._document.item("accessors", given.get(name), at)
         try:
@@ -253,6 +258,10 @@ class _Packed:
         if not np.isfinite(found).all():
             raise self._document.fail(at, "finite numbers were expected")
         return found
+
+
+def _listed(names: object) -> str:
+    return ", ".join(str(n)[:60] for n in names[:4]) if isinstance(names, list) else shown(names)
 
 
 def _uvs(
