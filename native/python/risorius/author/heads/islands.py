@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,8 +12,9 @@ import numpy as np
 from ...base.words import joined
 from ..geometry.skeleton import Doubles, Ints
 from ..input.obj import ObjMesh
-from .parts import HeadPart, Material, taken_apart
+from .parts import HeadPart, Material, first_vertices, taken_apart
 
+_INNER = re.compile(r"eye|iris|sclera|cornea|mouth|teeth|tooth|tongue|gum", re.IGNORECASE)
 _ROUND = 0.12  # of the radius: how far the vertices of a ball may lie off in the mean
 
 
@@ -46,7 +48,8 @@ def islands_of(mesh: ObjMesh) -> Ints:
 
 
 def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[HeadPart]:
-    """A mesh, or its islands by the material that most of their polygons have: no island is cut.
+    """A mesh, or its islands by the material that most of their polygons have. An island is cut
+    only along what is called eye, mouth and the like.
 
     Args:
         part: the mesh.
@@ -59,18 +62,19 @@ def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[He
         part.material = looks[most] if len(used) else None
         _tell(part, looks, set(used.tolist()) - {most})
         return [part]
-    islands = islands_of(part.mesh)
-    first = np.array([face[0] for face in part.mesh.faces])
+    islands = islands_of(part.mesh)[first_vertices(part)]
     counts = np.zeros((int(islands.max()) + 1, len(looks)))
-    np.add.at(counts, (islands[first], of_face), 1)
+    np.add.at(counts, (islands, of_face), 1)
     best = counts.argmax(axis=1)[islands]
+    inner = np.array([_INNER.search(look.name) is not None for look in looks])
+    best = np.where(inner[of_face], of_face, best)  # lids and lips hide where these are cut off
     out: list[HeadPart] = []
-    for place in np.unique(best[first]).tolist():
+    for place in np.unique(best).tolist():
         name = f"{part.source}_{looks[place].name}" if out else part.name
         for piece in taken_apart(part, [name], np.where(best == place, 0, -1)):
             piece.material = looks[place]
             out.append(piece)
-    _tell(out[0], looks, set(used.tolist()) - set(best[first].tolist()))
+    _tell(out[0], looks, set(used.tolist()) - set(best.tolist()))
     return out
 
 

@@ -119,23 +119,27 @@ def in_face_names(face: HeadPart, part: HeadPart) -> dict[str, Doubles]:
     return out
 
 
-def taken_apart(part: HeadPart, names: Sequence[str], labels: Ints) -> list[HeadPart]:
-    """A part divided: its vertices by label, in the order of the labels; none is shared.
+def first_vertices(part: HeadPart) -> Ints:
+    """int64[polygons]: a vertex of each."""
+    return np.array([face[0] for face in part.mesh.faces], np.int64)
+
+
+def taken_apart(part: HeadPart, names: Sequence[str], of_face: Ints) -> list[HeadPart]:
+    """A part divided, in the order of the labels; a vertex that two have becomes two.
 
     Args:
         part: is left as it is.
         names: of the new parts, by label.
-        labels: int64[V], alike along every polygon.
+        of_face: int64[polygons], the label of each.
     """
     out = []
-    of_face = np.array([labels[face[0]] for face in part.mesh.faces], np.int64)
     numbers = part.polygons if part.polygons is not None else np.arange(len(of_face))
     for label, name in enumerate(names):
-        kept = np.flatnonzero(labels == label)
         chosen = np.flatnonzero(of_face == label)
-        if not len(kept) or not len(chosen):
+        if not len(chosen):
             continue
-        place = np.zeros(len(labels), np.int64)
+        kept = np.unique(np.concatenate([part.mesh.faces[f] for f in chosen]))
+        place = np.zeros(len(part.mesh.positions), np.int64)
         place[kept] = np.arange(len(kept))
         mesh = ObjMesh(
             part.mesh.positions[kept],

@@ -12,7 +12,7 @@ from ...base.words import counted, joined
 from ..geometry.skeleton import Doubles
 from ..input.obj import ShapeFileError
 from .islands import islands_of
-from .parts import HeadPart, in_face_names, taken_apart
+from .parts import HeadPart, first_vertices, in_face_names, taken_apart
 from .sizes import in_words
 
 HEAD, JAW, FACE = "head", "FACIAL_C_Jaw", ""
@@ -153,7 +153,9 @@ def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
     )  # fmt: skip
     if low.all() or not low.any():
         return [(part, JAW if low.all() else HEAD)]
-    pieces = taken_apart(part, [f"{name}Upper", f"{name}Lower"], low[islands].astype(int))
+    pieces = taken_apart(
+        part, [f"{name}Upper", f"{name}Lower"], low[islands[first_vertices(part)]].astype(int)
+    )
     return [(piece, JAW if piece.name == f"{name}Lower" else HEAD) for piece in pieces]
 
 

@@ -13,7 +13,7 @@ from ..geometry import skeleton as sk
 from ..geometry.rigid import about, rigid_fit
 from ..geometry.skeleton import Doubles, Ints
 from .islands import Ball, ball_of, islands_of
-from .parts import HeadPart, taken_apart
+from .parts import HeadPart, first_vertices, taken_apart
 
 # What the look controls turn an eye by, in degrees about x (down is above 0) and y (left is).
 _LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
@@ -154,7 +154,7 @@ def _divided(
     out: list[HeadPart] = []
     kind = "cornea" if "cornea" in part.name.lower() else "eye"
     for number, name in enumerate((f"{kind}Left", f"{kind}Right", part.name)):
-        labels = np.where(of_island[islands] == number, 0, -1)
+        labels = np.where(of_island[islands[first_vertices(part)]] == number, 0, -1)
         theirs = eyes[number].parts if number < 2 else out
         theirs.extend(taken_apart(part, [name], labels))
     return out
