@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: MIT
-# The library `meshoptimizer` of its source package on PyPI, whose simplifier alone is compiled. The
-# source lies in build/third_party (an sdist of ours carries it); if it is not there, pip fetches it.
+# The library `meshoptimizer` of its source package on PyPI, of which the simplifier and the codecs are
+# compiled. The source lies in build/third_party (an sdist of ours carries it); if it is not there, pip
+# fetches it.
 set(version 0.2.30a0)
 set(sha256 36b18b61a95ba992de804b1e91e86be2ba185925e4e2c1481495f8c68a17f5db)
 set(folder "${PROJECT_SOURCE_DIR}/build/third_party/meshoptimizer")
-if(NOT EXISTS "${folder}/simplifier.cpp")
+set(files allocator.cpp simplifier.cpp indexcodec.cpp vertexcodec.cpp vertexfilter.cpp)
+set(missing ${files})
+foreach(file ${files})
+  if(EXISTS "${folder}/${file}")
+    list(REMOVE_ITEM missing ${file})
+  endif()
+endforeach()
+if(missing)
   find_program(python3 NAMES python3 python REQUIRED)
   set(package "${PROJECT_BINARY_DIR}/meshoptimizer-${version}.tar.gz")
   execute_process(COMMAND "${python3}" -m pip download --quiet --no-deps --no-binary meshoptimizer
@@ -20,15 +28,16 @@ if(NOT EXISTS "${folder}/simplifier.cpp")
     message(FATAL_ERROR "${package}: SHA256 ${sha256} was expected, found ${found}")
   endif()
   file(ARCHIVE_EXTRACT INPUT "${package}" DESTINATION "${PROJECT_BINARY_DIR}")
-  # simplifier.cpp, which is looked for, comes last: who stops in between leaves nothing that looks whole.
   set(unpacked "${PROJECT_BINARY_DIR}/meshoptimizer-${version}")
   file(MAKE_DIRECTORY "${folder}")
-  foreach(file meshoptimizer.h allocator.cpp simplifier.cpp)
+  foreach(file meshoptimizer.h ${files})
     file(COPY_FILE "${unpacked}/src/${file}" "${folder}/${file}")
   endforeach()
   file(REMOVE_RECURSE "${unpacked}" "${package}")
 endif()
-add_library(meshoptimizer STATIC "${folder}/allocator.cpp" "${folder}/simplifier.cpp")
+list(TRANSFORM files PREPEND "${folder}/")
+add_library(meshoptimizer STATIC ${files})
+set_target_properties(meshoptimizer PROPERTIES UNITY_BUILD OFF) # each file has macros of its own
 target_include_directories(meshoptimizer SYSTEM INTERFACE "${PROJECT_SOURCE_DIR}/build/third_party")
 if(NOT MSVC)
   # As our own code: the same bits everywhere. Its warnings are not ours.

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Joint rigs made from shapes.
+// Joint rigs made from shapes, and packed buffers of meshes.
+#include <array>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "author/fit.h"
+#include "author/packed.h"
 #include "author/simplify.h"
 #include "bindings/fields.h"
 
@@ -293,11 +297,94 @@ void bind_fits(py::module_& m) {
         py::arg("count"), "See risorius.author.simplify.");
 }
 
+using Bytes = std::vector<std::uint8_t>;
+
+/// The value of that name. Raises ValueError: none of the names.
+template <class T, std::size_t kCount>
+T named(const char* what, const std::string& name,
+        const std::array<std::pair<const char*, T>, kCount>& known) {
+  std::string all;
+  for (const auto& [own, value] : known) {
+    if (name == own) return value;
+    all += (all.empty() ? "" : ", ") + std::string(own);
+  }
+  throw py::value_error(std::string(what) + ": one of " + all + " was expected, found " + name);
+}
+
+author::Packing packing(std::size_t count, std::size_t stride, const std::string& mode,
+                        const std::string& filter) {
+  using author::PackedFilter;
+  using author::PackedMode;
+  constexpr std::array<std::pair<const char*, PackedMode>, 3> kModes{
+      {{"ATTRIBUTES", PackedMode::kAttributes},
+       {"TRIANGLES", PackedMode::kTriangles},
+       {"INDICES", PackedMode::kIndices}}};
+  constexpr std::array<std::pair<const char*, PackedFilter>, 4> kFilters{
+      {{"NONE", PackedFilter::kNone},
+       {"OCTAHEDRAL", PackedFilter::kOctahedral},
+       {"QUATERNION", PackedFilter::kQuaternion},
+       {"EXPONENTIAL", PackedFilter::kExponential}}};
+  return {count, stride, named("mode", mode, kModes), named("filter", filter, kFilters)};
+}
+
+/// What `work` gives, without the GIL. Raises ValueError with the error's sentence.
+template <class Work>
+py::bytes worked(const Work& work) {
+  const core::Result<Bytes> result = [&] {
+    const py::gil_scoped_release released;
+    return work();
+  }();
+  if (!result) throw py::value_error(result.error().describe());
+  return {reinterpret_cast<const char*>(result.value().data()), result.value().size()};
+}
+
+std::span<const std::uint8_t> span_of(const py::bytes& bytes) {
+  const std::string_view view = bytes;
+  return {reinterpret_cast<const std::uint8_t*>(view.data()), view.size()};
+}
+
+void bind_packed(py::module_& m) {
+  m.def(
+      "unpack_buffer",
+      [](const py::bytes& packed, std::size_t count, std::size_t stride, const std::string& mode,
+         const std::string& filter) {
+        const auto span = span_of(packed);
+        const author::Packing how = packing(count, stride, mode, filter);
+        return worked([&] { return author::unpack(span, how); });
+      },
+      py::arg("packed"), py::arg("count"), py::arg("stride"), py::arg("mode"), py::arg("filter"),
+      "The bytes of a buffer view of glTF's EXT_meshopt_compression, whose words the arguments "
+      "are.");
+  m.def(
+      "pack_buffer",
+      [](const py::bytes& rows, std::size_t count, std::size_t stride, const std::string& mode,
+         const std::string& filter) {
+        const auto span = span_of(rows);
+        const author::Packing how = packing(count, stride, mode, filter);
+        return worked([&] { return author::pack(span, how); });
+      },
+      py::arg("rows"), py::arg("count"), py::arg("stride"), py::arg("mode"), py::arg("filter"),
+      "Bytes that unpack_buffer gives back; with a filter, rows of filter_buffer.");
+  m.def(
+      "filter_buffer",
+      [](const py::array_t<float, py::array::c_style | py::array::forcecast>& values,
+         std::size_t stride, const std::string& filter, int bits) {
+        if (values.ndim() != 2) shape_error("values", "(n, k)", values);
+        const auto count = static_cast<std::size_t>(values.shape(0));
+        const author::Packing how = packing(count, stride, "ATTRIBUTES", filter);
+        const std::span<const float> span(values.data(), static_cast<std::size_t>(values.size()));
+        return worked([&] { return author::filtered(span, how, bits); });
+      },
+      py::arg("values"), py::arg("stride"), py::arg("filter"), py::arg("bits"),
+      "Rows of `stride` bytes that the filter of unpack_buffer turns into values[n, k].");
+}
+
 }  // namespace
 
 void bind_author(py::module_& m) {
   bind_fit_inputs(m);
   bind_fits(m);
+  bind_packed(m);
 }
 
 }  // namespace risorius::bindings

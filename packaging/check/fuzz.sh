@@ -6,7 +6,7 @@
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
 
-targets=(parse filter round_trip json evaluate coordinates rig clip)
+targets=(parse filter round_trip json evaluate coordinates rig clip packed)
 programs="$project/build/asan-ubsan/tests/fuzz"
 corpora="$project/build/fuzz-corpus"
 finds="$project/build/fuzz-finds"

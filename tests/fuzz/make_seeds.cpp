@@ -6,6 +6,7 @@
 #include <iostream>
 #include <iterator>
 
+#include "author/packed.h"
 #include "clip/file/encoder.h"
 #include "compile/compile.h"
 #include "dna/file/json.h"
@@ -69,6 +70,27 @@ class Seeds {
 
   /// For the target with a mistake in it, which one run of this finds.
   void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
+
+  /// Rows that come back, and packed ones of each mode: the bytes of packed_fuzz.
+  void add_packed() {
+    namespace author = risorius::author;
+    using Mode = author::PackedMode;
+    Bytes rows(1200);
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = i % 4 != 0 ? 0 : i / 12 % 64;
+    put("packed", "rows", {1, 2, 0, 0}, rows);
+    for (const auto& [mode, stride] :
+         {std::pair{Mode::kAttributes, std::size_t{12}},
+          std::pair{Mode::kTriangles, std::size_t{4}}, std::pair{Mode::kIndices, std::size_t{4}}}) {
+      const author::Packing packing{rows.size() / stride, stride, mode,
+                                    author::PackedFilter::kNone};
+      const auto kind = static_cast<std::uint8_t>(2 * static_cast<int>(mode));
+      const auto of = static_cast<std::uint8_t>(mode == Mode::kAttributes ? 2 : 1);
+      const auto count = static_cast<std::uint8_t>(packing.count % 256);
+      put("packed", "mode-" + std::to_string(kind),
+          {kind, of, count, static_cast<std::uint8_t>(packing.count / 256)},
+          *author::pack(rows, packing));
+    }
+  }
 
   void add_clips() {
     namespace clip = risorius::clip;
@@ -175,6 +197,7 @@ int main(int argc, char** argv) {
   }
   add_parts(seeds);
   seeds.add_clips();
+  seeds.add_packed();
   seeds.add_greedy();
   add_bombs(seeds);
   for (int i = 2; i < argc; ++i) {

@@ -1313,6 +1313,15 @@ def simplify(
 ) -> tuple[_U32, float]:
     """See risorius.author.simplify."""
 
+def unpack_buffer(packed: bytes, count: int, stride: int, mode: str, filter: str) -> bytes:
+    """The bytes of a buffer view of glTF's EXT_meshopt_compression, whose words the arguments are."""
+
+def pack_buffer(rows: bytes, count: int, stride: int, mode: str, filter: str) -> bytes:
+    """Bytes that unpack_buffer gives back; with a filter, rows of filter_buffer."""
+
+def filter_buffer(values: npt.ArrayLike, stride: int, filter: str, bits: int) -> bytes:
+    """Rows of `stride` bytes that the filter of unpack_buffer turns into values[n, k]."""
+
 def regroup(
     dna: Dna,
     *,

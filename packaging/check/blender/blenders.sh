@@ -59,7 +59,7 @@ build_wheel_in() { # build_wheel_in ROOT: its build tools are plain Python, fetc
   tag=$(chroot "$1" python3 -c 'import sys; print("cp%d%d" % sys.version_info[:2])')
   rm -f "$project"/build/dist/risorius-*-"$tag"-*.whl
   # Sources of PyPI that native/ compiles, too: the first wheel of this machine has fetched them.
-  [ -e "$project/build/third_party/meshoptimizer/simplifier.cpp" ] || build_wheel >&2
+  [ -e "$project/build/third_party/meshoptimizer/vertexfilter.cpp" ] || build_wheel >&2
   chroot "$1" sh -ec "
     [ -e /opt/risorius-venv/bin/pip ] || python3 -m venv /opt/risorius-venv
     /opt/risorius-venv/bin/pip install -q --no-index --find-links '$tools' scikit-build-core pybind11

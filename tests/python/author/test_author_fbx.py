@@ -81,7 +81,7 @@ class Egg:
         self.node.append(row("RotationOrder", ORDER))
         self.settings = [row("UnitScaleFactor", 1.0)]
         self.shape = {}  # what the first target has instead
-        self.extra = []
+        self.extra, self.links = [], []
 
     def save(self, path, version=7400):
         objects = [
@@ -98,7 +98,7 @@ class Egg:
             ("Deformer", (I64(BLEND), "\0\1Deformer", "BlendShape")),
             *self.extra,
         ]  # fmt: skip
-        links = [(MESH, NODE), (NODE, ABOVE), (ABOVE, 0), (BLEND, MESH)]
+        links = [(MESH, NODE), (NODE, ABOVE), (ABOVE, 0), (BLEND, MESH), *self.links]
         for number, (name, delta) in enumerate(self.moved.items()):
             channel = 100 + 10 * number
             links.append((channel, BLEND))
@@ -253,3 +253,51 @@ def test_damaged_files_are_refused_or_read(tmp_path):
         except (RisoriusError, BudgetError):
             refused += 1
     assert refused > 200
+
+
+def test_a_mirrored_and_cut_head_is_one_surface_that_shows_its_front(tmp_path):
+    egg = Egg()
+    whole, seam = egg.positions.copy(), np.arange(11, 506, 23)
+    cut = egg.corners.copy()
+    right = np.isin(cut[:, 0] % 23, range(11, 23))
+    for number, vertex in enumerate(seam.tolist()):
+        cut[right] = np.where(cut[right] == vertex, 506 + number, cut[right])
+    was = np.concatenate([np.arange(506), seam])
+    egg.moved = {name: delta[was] for name, delta in egg.moved.items()}
+    ends = cut.copy()
+    ends[:, 3] = ~ends[:, 3]
+    egg.mesh = {"Vertices": vectors(whole[was]), "PolygonVertexIndex": ends.ravel()}
+    egg.node = [row("Lcl Scaling", -1.0, 1.0, 1.0)]
+    mesh, found = read_fbx(egg.save(tmp_path / "egg.fbx"))
+    np.testing.assert_allclose(mesh.positions, whole * [-0.01, 0.01, 0.01] + [0, 0, 0.1], atol=1e-9)
+    assert mesh.faces == egg.corners[:, ::-1].tolist()
+    assert mesh.uv_faces == egg.uv_index.reshape(-1, 4)[:, ::-1].tolist()
+    assert len(found["jawOpen"]) == 506
+
+
+def test_a_skinned_head_stands_as_it_was_bound(tmp_path):
+    egg = Egg()
+    places = {
+        30: (0.0, 50.0, 0.0),
+        31: (0.0, 20.0, 0.0),
+    }  # a spine and the neck on it, which is posed
+    bound = {30: (0.0, -50.0, 0.0), 31: (0.0, -70.0, 0.0)}
+    egg.links = [(30, 0), (31, 30), (20, MESH), (21, 20), (22, 20), (31, 21), (30, 22)]
+    for joint, shift in places.items():
+        more = [row("Lcl Rotation", 0.0, 90.0, 0.0)] if joint == 31 else []
+        egg.extra.append(
+            ("Model", (I64(joint), "J\0\1Model", "LimbNode"),
+             [("Properties70", (), [row("Lcl Translation", *shift), *more])])
+        )  # fmt: skip
+    egg.extra.append(("Deformer", (I64(20), "\0\1Deformer", "Skin")))
+    for cluster, joint in ((21, 31), (22, 30)):
+        matrix = np.eye(4)
+        matrix[:3, :3] *= 2.0
+        matrix[:3, 3] = bound[joint]
+        egg.extra.append(
+            ("Deformer", (I64(cluster), "\0\1SubDeformer", "Cluster"),
+             [("Transform", (matrix.T.ravel().copy(),))])
+        )  # fmt: skip
+    mesh, found = read_fbx(egg.save(tmp_path / "egg.fbx"))
+    np.testing.assert_allclose(mesh.positions, egg.positions * 2 / 100, atol=1e-9)
+    np.testing.assert_allclose(found["jawOpen"], egg.moved["jawOpen"] * 2 / 100, atol=1e-9)

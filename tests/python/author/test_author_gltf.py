@@ -1,128 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Heads from glTF: seams, sparse targets, strides, a node that turns and scales; and refusals."""
 
-import json
-import struct
-
 import command_line
 import face_shapes
 import numpy as np
 import pytest
+from glb_files import SCALE, SHIFT, TURN, egg, world
 from risorius.author.input import gltf
 from risorius.author.input.obj import ShapeFileError
+from risorius.base.budget import BudgetError
 from risorius.importing.errors import AnimationFileError
-
-TURN = [0.0, 0.6, 0.0, 0.8]  # a quaternion about y
-SCALE, SHIFT = 2.0, [1.0, 2.0, 3.0]
-
-
-class Glb:
-    """A GLB that is written piece by piece."""
-
-    def __init__(self):
-        self.binary = b""
-        self.json = {
-            "asset": {"version": "2.0"}, "accessors": [], "bufferViews": [], "meshes": [],
-            "buffers": [{}],
-        }  # fmt: skip
-
-    def view(self, data, stride=0):
-        self.binary += b"\0" * (-len(self.binary) % 4)
-        row = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
-        if stride:
-            row["byteStride"] = stride
-        self.binary += data
-        self.json["bufferViews"].append(row)
-        return len(self.json["bufferViews"]) - 1
-
-    def accessor(self, array, kind, component=5126, stride=0):
-        array = np.asarray(array)
-        data = array.tobytes()
-        if stride:
-            rows = array.reshape(len(array), -1)
-            data = b"".join(row.tobytes().ljust(stride, b"\xee") for row in rows)
-        row = {"bufferView": self.view(data, stride), "type": kind, "count": len(array),
-               "componentType": component}  # fmt: skip
-        self.json["accessors"].append(row)
-        return len(self.json["accessors"]) - 1
-
-    def sparse(self, array):
-        moved = np.flatnonzero(np.any(array, axis=1)).astype("<u2")
-        row = {
-            "type": "VEC3", "count": len(array), "componentType": 5126,
-            "sparse": {
-                "count": len(moved),
-                "indices": {"bufferView": self.view(moved.tobytes()), "componentType": 5123},
-                "values": {"bufferView": self.view(array[moved].astype("<f4").tobytes())},
-            },
-        }  # fmt: skip
-        self.json["accessors"].append(row)
-        return len(self.json["accessors"]) - 1
-
-    def save(self, path):
-        binary = self.binary + b"\0" * (-len(self.binary) % 4)
-        self.json["buffers"][0]["byteLength"] = len(binary)
-        text = json.dumps(self.json).encode()
-        text += b" " * (-len(text) % 4)
-        length = 12 + 8 + len(text) + 8 + len(binary)
-        path.write_bytes(
-            struct.pack("<4sII", b"glTF", 2, length)
-            + struct.pack("<I4s", len(text), b"JSON") + text
-            + struct.pack("<I4s", len(binary), b"BIN\0") + binary
-        )  # fmt: skip
-
-
-def world(points):
-    x, y, z, w = TURN
-    matrix = np.array([[1 - 2 * y * y, 0, 2 * y * w], [0, 1, 0], [-2 * y * w, 0, 1 - 2 * y * y]])
-    assert x == z == 0
-    assert abs(y * y + w * w - 1) < 1e-12
-    return SCALE * points @ matrix.T
-
-
-def egg(path, *, sparse=True, change=None):
-    """The formula's head: two primitives, every vertex of the second column twice."""
-    positions, faces = face_shapes.head()
-    moved = face_shapes.expressions(positions)
-    triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
-    double = np.arange(len(positions)).reshape(face_shapes.DOWN, -1)[:, 1]
-    order = np.concatenate([np.arange(len(positions)), double])
-    again = dict(zip(double.tolist(), range(len(positions), len(order)), strict=True))
-    second = triangles[len(triangles) // 2 :].copy()
-    for old, new in again.items():
-        second[second == old] = new
-    glb = Glb()
-    place = glb.accessor(positions[order].astype("<f4") / 100, "VEC3", stride=20)
-    uvs = np.stack([np.linspace(0, 1, len(order)), np.linspace(1, 0, len(order))], axis=1)
-    shared = {
-        "attributes": {
-            "POSITION": place,
-            "TEXCOORD_0": glb.accessor(uvs.astype("<f4"), "VEC2"),
-        },
-        "targets": [
-            {"POSITION": glb.sparse(delta[order] / 100) if sparse
-             else glb.accessor((delta[order] / 100).astype("<f4"), "VEC3")}
-            for delta in moved.values()
-        ],
-    }  # fmt: skip
-    glb.json["meshes"] = [
-        {
-            "name": "Egg",
-            "extras": {"targetNames": list(moved)},
-            "primitives": [
-                {**shared, "indices": glb.accessor(part.ravel().astype("<u4"), "SCALAR", 5125)}
-                for part in (triangles[: len(triangles) // 2], second)
-            ],
-        }
-    ]
-    glb.json["nodes"] = [
-        {"children": [1], "translation": SHIFT},
-        {"mesh": 0, "rotation": TURN, "scale": [SCALE] * 3},
-    ]
-    if change:
-        change(glb.json)
-    glb.save(path)
-    return positions / 100, {name: delta / 100 for name, delta in moved.items()}, uvs
 
 
 @pytest.mark.parametrize("sparse", [True, False])
@@ -140,6 +27,74 @@ def test_a_head_is_what_was_written(tmp_path, sparse):
         for vertex, uv in zip(face, uv_face, strict=True):
             assert vertex == uv or uv >= len(positions)  # the second of a double one
     np.testing.assert_allclose(mesh.uvs[: len(uvs)], [1, -1] * uvs + [0, 1], atol=1e-6)
+
+
+def outward(mesh):
+    """The share of triangles that show their faces to who stands before the head."""
+    points = mesh.positions[np.array(mesh.faces)]
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    return (
+        np.sum(normals * (points.mean(axis=1) - mesh.positions.mean(axis=0)), axis=1) > 0
+    ).mean()
+
+
+def test_a_mirror_shows_the_backs_of_no_polygons(tmp_path):
+    path = tmp_path / "egg.glb"
+    egg(path)
+    plain = outward(gltf.read_gltf(path)[0])
+    positions, moved, _ = egg(
+        path, change=lambda j: j["nodes"][1].update(scale=[-SCALE, SCALE, SCALE])
+    )
+    mesh, found = gltf.read_gltf(path)
+    assert outward(mesh) == plain
+    np.testing.assert_allclose(mesh.positions, world(positions * [-1, 1, 1]) + SHIFT, atol=1e-6)
+    name = "mouthSmileLeft"
+    np.testing.assert_allclose(found[name], world(moved[name] * [-1, 1, 1]), atol=1e-6)
+
+
+def skinned(path, change=None):
+    """As quantizers write a skinned head: the way back to metres is in the skin, the neck is posed,
+    and the node of the mesh stands far away."""
+
+    def posed(document):
+        document["nodes"] = [
+            {"name": "mesh", "mesh": 0, "skin": 0, "translation": [9, 9, 9], "scale": [5, 5, 5]},
+            {"children": [2], "translation": SHIFT, "rotation": TURN, "scale": [SCALE] * 3},
+            {"children": [3], "translation": [0, 0.5, 0]},
+            {"translation": [0, 0.2, 0], "rotation": [0.6, 0, 0, 0.8]},
+        ]
+        document["skins"] = [
+            {"joints": [3, 2], "inverseBindMatrices": len(document["accessors"]) - 1}
+        ]
+        if change:
+            change(document)
+
+    matrices = []
+    for shift in (-0.7, -0.5):
+        matrix = np.eye(4)
+        matrix[1, 3] = shift
+        matrices.append((matrix @ np.diag([0.5, 0.5, 0.5, 1.0])).T)
+    return egg(path, change=posed, matrices=np.array(matrices, "<f4").reshape(-1, 16))
+
+
+def test_a_skinned_head_stands_as_it_was_bound(tmp_path):
+    path = tmp_path / "egg.glb"
+    positions, moved, _ = skinned(path)
+    mesh, found = gltf.read_gltf(path)
+    np.testing.assert_allclose(mesh.positions, world(positions / 2) + SHIFT, atol=1e-6)
+    np.testing.assert_allclose(found["jawOpen"], world(moved["jawOpen"] / 2), atol=1e-6)
+
+    def said(**values):
+        skinned(path, lambda j: j["skins"][0].update(values))
+        with pytest.raises(AnimationFileError) as error:
+            gltf.read_gltf(path)
+        assert str(error.value).startswith(str(path))
+        return str(error.value)
+
+    assert "skins[0].joints: nodes were expected, found" in said(joints=[])
+    assert "nodes[9] was expected, there are 4" in said(joints=[9])
+    assert "skins[0].inverseBindMatrices: 3 were expected, found 2" in said(joints=[1, 2, 3])
+    assert "MAT4 was expected, found 'VEC3'" in said(inverseBindMatrices=0)
 
 
 def test_the_command_makes_a_rig_of_it(tmp_path):
@@ -173,11 +128,30 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
     none = [{"primitives": []}]
     assert "morph targets was expected, found none" in said(lambda j: j.update(meshes=none))
     assert "one of Egg was expected, found Ham" in said(None, mesh="Ham")
-    assert "is not read: export it without" in said(
-        lambda j: j.update(extensionsRequired=["KHR_draco_mesh_compression"])
-    )
     assert "triangles were expected" in said(primitive("mode", 1))
-    assert "VEC3 was expected" in said(accessor(0, componentType=[]))
+    assert "accessors[a number of 401 digits] was expected, there are" in said(
+        lambda j: j["meshes"][0]["primitives"][0].update(indices=10**400)
+    )
+
+    def crowd(document):
+        """Primitives that share all their vertices and have no indices."""
+        shape = {"POSITION": 0}
+        document["meshes"][0]["primitives"] = [{"attributes": shape, "targets": [shape]}] * 20_000
+
+    assert "POSITION: a bufferView was expected, found none; the file requires EXT_new" in said(
+        lambda j: j.update(extensionsRequired=["EXT_new"]) or j["accessors"][0].pop("bufferView")
+    )
+    assert "bytes more than the" in said(crowd, BudgetError)
+    assert "nodes[1]: it hangs on itself" in said(lambda j: j["nodes"][1].update(children=[0]))
+    assert "componentType: one of 5120, 5121, 5122, 5123, 5126 was expected, found 5125" in said(
+        accessor(0, componentType=5125)
+    )
+    assert "meshes[0]: triangles were expected, found none" in said(
+        lambda j: [
+            j["accessors"][p["indices"]].update(count=0) for p in j["meshes"][0]["primitives"]
+        ]
+    )
+    assert "componentType: one of 5120" in said(accessor(0, componentType=[]))
     assert "found a list" in said(accessor(0, type=[1]))
     huge = 10**400
     assert "found a number of 401 digits" in said(accessor(0, count=huge))
@@ -192,7 +166,10 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
     assert "a stride of 12 bytes or more" in said(
         lambda j: j["bufferViews"][0].update(byteStride=8)
     )
-    assert "of 528 vertices were expected" in said(accessor(9, componentType=5120))
+    assert "one of 5121, 5123, 5125 was expected, found 5120" in said(
+        accessor(9, componentType=5120)
+    )
+    assert "of 528 vertices were expected" in said(accessor(9, bufferView=0, count=9))
     assert "3 finite numbers were expected" in said(
         lambda j: j["nodes"][1].update(scale=[1, "2", 3])
     )

@@ -164,8 +164,8 @@ def damaged(change):
     [
         (lambda d: d.pop("animations"), "an animation was expected, found none"),
         (lambda d: d["accessors"][1].update(count=3), "4 values for 2 targets and 2 keys"),
-        (lambda d: d["accessors"][1].update(count=5), "bytes from 8 were expected, the buffer is"),
-        (lambda d: d["accessors"][0].update(count=3), "12 bytes from 0 were expected"),
+        (lambda d: d["accessors"][1].update(count=5), "bytes from 0 of bufferViews.1. were"),
+        (lambda d: d["accessors"][0].update(count=3), "12 bytes from 0 of bufferViews.0. were"),
         (lambda d: d["accessors"][0].update(type="VEC3"), "numbers one by one were expected"),
         (lambda d: d["animations"][0]["channels"][0].update(sampler=7), "a sampler was expected"),
         (lambda d: d["nodes"].clear(), r"nodes\[0\] was expected, there are 0"),

@@ -29,16 +29,18 @@ class Budget:
     Args:
         bytes_: that may be held, in all.
         steps: that may be done; about one per number that is looked at, some nanoseconds each.
+        name: of the file, which errors begin with; "": the caller names it.
     """
 
-    def __init__(self, bytes_: int, steps: int) -> None:
+    def __init__(self, bytes_: int, steps: int, name: str = "") -> None:
+        self._name = f"{name}: " if name else ""
         self.bytes = self._bytes = bytes_
         self.steps = self._steps = steps
 
     @classmethod
-    def of(cls, size: int) -> Budget:
-        """For what `size` bytes say."""
-        return cls(BASE_BYTES + BYTES_PER_BYTE * size, BASE_STEPS + STEPS_PER_BYTE * size)
+    def of(cls, size: int, name: str = "") -> Budget:
+        """For what `size` bytes say, of a file of that name."""
+        return cls(BASE_BYTES + BYTES_PER_BYTE * size, BASE_STEPS + STEPS_PER_BYTE * size, name)
 
     def hold(self, count: float, place: str) -> None:
         """Take `count` bytes of the budget, before they are held.
@@ -51,7 +53,7 @@ class Budget:
             BudgetError: fewer are left.
         """
         self.bytes = _left(
-            self.bytes, self._bytes, count, f"{place}: {_amount(count)} bytes", "taken"
+            self.bytes, self._bytes, count, f"{self._name}{place}: {_amount(count)} bytes", "taken"
         )
 
     def work(self, count: float, place: str) -> None:
@@ -65,7 +67,7 @@ class Budget:
             BudgetError: fewer are left.
         """
         self.steps = _left(
-            self.steps, self._steps, count, f"{place}: {_amount(count)} steps", "done"
+            self.steps, self._steps, count, f"{self._name}{place}: {_amount(count)} steps", "done"
         )
 
 

@@ -20,6 +20,7 @@ from ..base.given import GivenError, shown, whole
 from . import named_json
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
+from .packed import draco, meshopt
 from .source import Take, keep_ascending, make_clip, read_bytes
 
 Doubles = npt.NDArray[np.float64]
@@ -28,6 +29,11 @@ MAGIC = b"glTF"
 # Frames a second of curves that bend between their keys.
 RATE = 60.0
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+FLOATS = (5126,)
+COORDINATES = (5120, 5121, 5122, 5123, 5126)
+"""Component types of positions, their changes and texture coordinates, also of quantized ones."""
+INDICES = (5121, 5123, 5125)
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _KINDS = {"STEP": CONSTANT, "LINEAR": LINEAR, "CUBICSPLINE": CUBIC}
 
 
@@ -43,6 +49,7 @@ class Document:
         self.json = json
         self._binary = binary
         self._buffers: dict[int, bytes] = {}
+        self._unpacked: dict[int, bytes] = {}
         self._numbers: dict[int, Doubles] = {}
 
     def fail(self, place: str, message: str) -> AnimationFileError:
@@ -69,7 +76,7 @@ class Document:
         if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
             raise self.fail(place, f"an index of {kind} was expected, found {shown(index)}")
         if not 0 <= index < len(rows) or not isinstance(rows[index], dict):
-            raise self.fail(place, f"{kind}[{index}] was expected, there are {len(rows)}")
+            raise self.fail(place, f"{kind}[{shown(index)}] was expected, there are {len(rows)}")
         return rows[index]
 
     def whole(self, table: Mapping[str, Any], key: str, place: str, default: int = 0) -> int:
@@ -129,36 +136,46 @@ class Document:
         self._numbers[int(index)] = out  # type: ignore[call-overload]  # item says it is one
         return out
 
-    def rows(self, index: object, place: str, kind: str) -> Doubles:
-        """float64[count, n] of an accessor of meshes: n is 1, 2 or 3 by its kind.
+    def rows(
+        self, index: object, place: str, kind: str, components: Sequence[int] = COORDINATES
+    ) -> Doubles:
+        """float64[count, n] of an accessor of meshes: n is 1, 2, 3, 4 or 16 by its kind.
 
-        Strided and sparse ones too. Whole numbers stay what they are, unless the file says that
-        they are fractions.
+        Strided, sparse, quantized and packed ones too. Whole numbers stay what they are, unless the
+        file says that they are fractions.
 
         Args:
             index: of the accessor, as the file gives it.
             place: what errors name: where the index stands.
-            kind: "SCALAR", "VEC2" or "VEC3".
+            kind: "SCALAR", "VEC2", "VEC3", "VEC4" or "MAT4".
+            components: component types that are allowed there.
 
         Raises:
             AnimationFileError: no such accessor, one of another kind, one that reaches beyond its
-                buffer, numbers that are not finite.
+                buffer, damaged bytes, numbers that are not finite.
             BudgetError: more numbers than a file of this size may hold.
         """
         accessor = self.item("accessors", index, place)
         at = f"accessors[{index}]"
-        if accessor.get("type") != kind or not _is_key(accessor.get("componentType"), _TYPES):
+        if accessor.get("type") != kind:
             raise self.fail(at, f"{kind} was expected, found {shown(accessor.get('type'))}")
-        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[kind]
-        dtype = np.dtype(_TYPES[accessor["componentType"]])
+        component = accessor.get("componentType")
+        if not _is_key(component, _TYPES) or component not in components:
+            allowed = ", ".join(str(c) for c in components)
+            raise self.fail(
+                f"{at}.componentType", f"one of {allowed} was expected, found {shown(component)}"
+            )
+        width = _WIDTHS[kind]
+        dtype = np.dtype(_TYPES[component])
         count = self.whole(accessor, "count", at)
         self.budget.hold(count * width * 8, at)
         out = np.zeros((count, width))
-        if "bufferView" in accessor:
-            out[:] = self._viewed(accessor, at, dtype, (count, width))
         sparse = accessor.get("sparse")
-        if isinstance(sparse, dict):
-            self._put_sparse(sparse, f"{at}.sparse", dtype, out)
+        with np.errstate(invalid="ignore"):  # of some NaNs, which are refused below
+            if "bufferView" in accessor:
+                out[:] = self._viewed(accessor, at, dtype, (count, width))
+            if isinstance(sparse, dict):
+                self._put_sparse(sparse, f"{at}.sparse", dtype, out)
         if accessor.get("normalized") is True and dtype.kind != "f":
             out = np.maximum(out / np.iinfo(dtype).max, -1.0)
         if not np.isfinite(out).all():
@@ -187,39 +204,87 @@ class Document:
         self, table: Mapping[str, Any], at: str, dtype: np.dtype[Any], shape: tuple[int, int]
     ) -> npt.NDArray[Any]:
         """Numbers [shape] where a table's bufferView and byteOffset say, with the view's stride."""
-        view = self.item("bufferViews", table.get("bufferView"), at)
-        view_at = f"bufferViews[{table['bufferView']}]"
-        data = self._buffer(view.get("buffer"), view_at)
+        number = table.get("bufferView")
+        view = self.item("bufferViews", number, at)
+        view_at = f"bufferViews[{number}]"
         row = dtype.itemsize * shape[1]
         stride = self.whole(view, "byteStride", view_at, row)
         if stride < row:
             raise self.fail(
                 view_at, f"a stride of {row} bytes or more was expected, found {stride}"
             )
+        data, start, size = self._part(number, at)
         inside = self.whole(table, "byteOffset", at)
-        start = self.whole(view, "byteOffset", view_at) + inside
         length = stride * (shape[0] - 1) + row if shape[0] else 0
-        if inside + length > self.whole(view, "byteLength", view_at) or start + length > len(data):
-            raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
-        return np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize))
+        if inside + length > size:
+            raise self.fail(
+                at,
+                f"{shown(length)} bytes from {shown(inside)} of {view_at} were expected, the "
+                f"buffer is shorter: {size} bytes",
+            )
+        return np.ndarray(shape, dtype, data, start + inside, (stride, dtype.itemsize))
+
+    def _part(self, index: object, place: str) -> tuple[bytes, int, int]:
+        """Bytes, and where in them and how long a buffer view is; unpacked where it is packed."""
+        view = self.item("bufferViews", index, place)
+        view_at = f"bufferViews[{index}]"
+        number = int(index)  # type: ignore[call-overload]  # item says it is one
+        if number in self._unpacked:
+            return self._unpacked[number], 0, len(self._unpacked[number])
+        try:
+            packing = meshopt.packing_of(view)
+            if packing is None:
+                return self._stored(view, view_at)
+            self.budget.hold(packing.size, view_at)
+            data, start, size = self._stored(packing.table, f"{view_at}.{packing.name}")
+            out = meshopt.unpacked(data[start : start + size], packing)
+        except GivenError as error:
+            raise self.fail(view_at, str(error)) from None
+        self._unpacked[number] = out
+        return out, 0, len(out)
+
+    def _stored(self, table: Mapping[str, Any], place: str) -> tuple[bytes, int, int]:
+        """The buffer that a table names, and its byteOffset and byteLength in it."""
+        data = self._buffer(table.get("buffer"), place)
+        start, size = (self.whole(table, key, place) for key in ("byteOffset", "byteLength"))
+        if start + size > len(data):
+            raise self.fail(
+                place,
+                f"{shown(size)} bytes from {shown(start)} were expected, the buffer is shorter: "
+                f"{len(data)} bytes",
+            )
+        return data, start, size
 
     def view_bytes(self, index: object, place: str) -> bytes:
         """The bytes of a buffer view, such as a picture.
 
         Args:
-            index: of the view, as the file gives it.
+            index: of the buffer view, as the file gives it.
             place: what errors name: where the index stands.
 
         Raises:
             AnimationFileError: no such view, or one that reaches beyond its buffer.
+            BudgetError: more bytes than a file of this size may hold.
         """
-        view = self.item("bufferViews", index, place)
-        at = f"bufferViews[{index}]"
-        data = self._buffer(view.get("buffer"), at)
-        start, length = self.whole(view, "byteOffset", at), self.whole(view, "byteLength", at)
-        if start + length > len(data):
-            raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
-        return data[start : start + length]
+        data, start, size = self._part(index, place)
+        self.budget.hold(size, place)
+        return data[start : start + size]
+
+    def draco(self, table: Mapping[str, Any], place: str) -> draco.DracoMesh:
+        """The mesh that Draco packed.
+
+        Args:
+            table: of the primitive's extension.
+            place: what errors name: where it stands.
+
+        Raises:
+            AnimationFileError: no such bytes, no mesh of Draco, or DracoPy is not installed.
+        """
+        packed = self.view_bytes(table.get("bufferView"), place)
+        try:
+            return draco.DracoMesh(packed)
+        except (GivenError, draco.MissingDracoError) as error:
+            raise self.fail(place, str(error)) from None
 
     def _buffer(self, index: object, place: str) -> bytes:
         table = self.item("buffers", index, place)

@@ -20,6 +20,7 @@ from ...importing.fbx import Node, Parser, Scene, is_fbx, object_name, propertie
 from ...importing.source import read_bytes
 from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError, choose_mesh, refuse_other_kinds
+from .welding import welded
 
 SUFFIX = ".fbx"
 _SKIPPED = frozenset(("Video", "Texture", "Material", "Pose", "Implementation"))
@@ -31,7 +32,9 @@ _DEEPEST = 64  # nodes above a mesh
 def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     """A mesh in metres, y up, and float64[V, 3] of each of its blend shapes by name.
 
-    Of a channel with several targets that are reached one after the other, the last is taken.
+    Of a channel with several targets that are reached one after the other, the last is taken. The
+    mesh stands where its node puts it, or its skin as it was bound. Vertices that a file has
+    several times, as exporters for games write them along seams of the texture, are one.
 
     Args:
         path: of the file.
@@ -62,7 +65,7 @@ def open_scene(path: Path, skipped: frozenset[str] = _SKIPPED) -> Scene:
     refuse_other_kinds(path, "a binary FBX", (signatures.FBX.code,))
     if not is_fbx(data):
         raise ShapeFileError(f"{path}: a binary FBX was expected")
-    return read_scene(Parser(data, str(path), Budget.of(len(data)), skipped))
+    return read_scene(Parser(data, str(path), Budget.of(len(data), str(path)), skipped))
 
 
 def meshes_of(scene: Scene) -> list[tuple[int, str]]:
@@ -96,7 +99,11 @@ def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
     }
     ends = np.cumsum([len(face) for face in faces])[:-1]
     uv_faces = [part.tolist() for part in np.split(uv_corners, ends)]
-    return ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces), shapes
+    if np.linalg.det(turn[:3, :3]) < 0:  # a mirror shows the backs of polygons
+        faces, uv_faces = ([row[::-1] for row in rows] for rows in (faces, uv_faces))
+    found = ObjMesh(points @ turn[:3, :3].T + turn[:3, 3], uvs, faces, uv_faces)
+    found, moved = welded(found, list(shapes.values()))
+    return found, dict(zip(shapes, moved, strict=True))
 
 
 def _choose(scene: Scene, path: Path, wanted: str) -> int:
@@ -244,15 +251,56 @@ def _model_of(scene: Scene, number: int) -> int:
 
 
 def _to_world(scene: Scene, mesh: int) -> Doubles:
-    """float64[4, 4] of a mesh' node and of all above it, column vectors."""
+    """float64[4, 4] of a mesh' node and of all above it, or of its skin, column vectors."""
     at = _model_of(scene, mesh)
     out = _geometric(scene, scene.objects[at]) if at else np.eye(4)
-    for _ in range(_DEEPEST):
-        if not at:
-            break
-        out = _local(scene, scene.objects[at]) @ out
-        at = _model_of(scene, at)
+    joint = _top_joint(scene, mesh)
+    if joint is None:
+        return _product(scene, _chain(scene, at)) @ out
+    stands, place = joint
+    return _product(scene, stands) @ place @ out
+
+
+def _chain(scene: Scene, node: int) -> list[int]:
+    """A node and all above it, the root last."""
+    out: list[int] = []
+    while node and len(out) < _DEEPEST:
+        out.append(node)
+        node = _model_of(scene, node)
     return out
+
+
+def _product(scene: Scene, chain: Sequence[int]) -> Doubles:
+    """float64[4, 4] from the first of these nodes to the world."""
+    out = np.eye(4)
+    for node in chain:
+        out = _local(scene, scene.objects[node]) @ out
+    return out
+
+
+def _top_joint(scene: Scene, mesh: int) -> tuple[list[int], Doubles] | None:
+    """The joint of a mesh' skin that is nearest to the root, with all above it, and float64[4, 4]
+    where that joint had the mesh when it was bound; None: no skin says it. The mesh' own node and
+    other joints may stand anywhere."""
+    found: tuple[list[int], Node] | None = None
+    for skin, _ in _below(scene, mesh, "Deformer", "Skin"):
+        for cluster, node in _below(scene, skin, "Deformer", "Cluster"):
+            joints = [n for n in scene.children.get(cluster, []) if _is_model(scene, n)]
+            if node.length("Transform") != 16 or not joints:
+                continue
+            chain = _chain(scene, joints[0])
+            scene.budget.work(len(chain), "joints")
+            if found is None or len(chain) < len(found[0]):
+                found = chain, node
+    if found is None:
+        return None
+    place = _numbers(scene, found[1], "Transform")
+    return found[0], place.reshape(4, 4).T.astype(np.float64)
+
+
+def _is_model(scene: Scene, number: int) -> bool:
+    node = scene.objects.get(number)
+    return node is not None and node.name == "Model"
 
 
 def _geometric(scene: Scene, node: Node) -> Doubles:
@@ -270,11 +318,18 @@ def _local(scene: Scene, node: Node) -> Doubles:
     read = _Transforms(scene, node)
     pivot, scaled = read.shift("RotationPivot"), read.shift("ScalingPivot")
     turned = read.turn("PreRotation") @ read.turn("Lcl Rotation", read.order())
-    turned = turned @ np.linalg.inv(read.turn("PostRotation"))
+    turned = turned @ read.turn("PostRotation").T
     out = read.shift("Lcl Translation") @ read.shift("RotationOffset")
-    out = out @ pivot @ turned @ np.linalg.inv(pivot)
-    sized = scaled @ read.size("Lcl Scaling") @ np.linalg.inv(scaled)
+    out = out @ pivot @ turned @ _back(pivot)
+    sized = scaled @ read.size("Lcl Scaling") @ _back(scaled)
     return out @ read.shift("ScalingOffset") @ sized
+
+
+def _back(shift: Doubles) -> Doubles:
+    """The inverse of a shift. LAPACK's, of many threads, takes milliseconds on a busy machine."""
+    out = shift.copy()
+    out[:3, 3] *= -1
+    return out
 
 
 class _Transforms:

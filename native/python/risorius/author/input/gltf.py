@@ -10,22 +10,28 @@ from typing import Any
 import numpy as np
 
 from ...base import signatures
-from ...base.given import GivenError, finite, several
+from ...base.budget import Budget
+from ...base.given import GivenError, finite, several, shown
 from ...importing import named_json
-from ...importing.gltf import Document, is_glb, is_gltf, open_glb, open_gltf
+from ...importing.gltf import FLOATS, INDICES, Document, is_glb, is_gltf, open_glb, open_gltf
+from ...importing.packed.draco import EXTENSION as DRACO
 from ...importing.source import decode, read_bytes
 from ..geometry.skeleton import Doubles, Ints
 from .obj import ObjMesh, ShapeFileError, choose_mesh, refuse_other_kinds
+from .welding import welded
 
-SUFFIXES = (".glb", ".gltf")
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+SUFFIXES = (".glb", ".gltf", ".vrm")  # VRM is a GLB with a body's bones by name
 _TRIANGLES = 4
+_DEEPEST = 1024  # nodes above a mesh
+_CORNER_BYTES = 48  # of a triangle's corner in arrays and lists
+_FURTHEST_UV = 1e6
 
 
 def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     """A mesh of triangles in metres, y up, and float64[V, 3] of each of its morph targets by name.
 
-    Vertices that a glTF has several times, for seams of the texture or of the normals, are one.
+    It stands where its node puts it, or its skin as it was bound. Vertices that a glTF has several
+    times, for seams of the texture or of the normals, are one.
 
     Args:
         path: of the file.
@@ -37,31 +43,32 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         BudgetError: more numbers than a file of this size may hold.
     """
     document = open_document(path)
-    number = _choose(document, path, mesh)
-    return assembled(document, number)
+    mesh_number = _choose(document, path, mesh)
+    found, shapes = assembled(document, mesh_number)
+    if not found.faces:
+        raise document.fail(f"meshes[{mesh_number}]", "triangles were expected, found none")
+    return found, shapes
 
 
 def open_document(path: Path) -> Document:
     """A glTF whose meshes are read.
 
+    Args:
+        path: of the file.
+
     Raises:
-        ShapeFileError: another kind of file, or one whose meshes are compressed.
+        ShapeFileError: another kind of file.
         AnimationFileError: the file is damaged; with the place in it.
     """
     data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a glTF", (signatures.GLB.code,))
+    budget = Budget.of(len(data), str(path))
     if is_glb(data):
-        document = open_glb(path, data)
-    else:
-        json = named_json.parse(decode(data, str(path)), str(path))
-        if not is_gltf(json):
-            raise ShapeFileError(f"{path}: a glTF was expected")
-        document = open_gltf(path, json)
-    used = document.json.get("extensionsRequired") or []
-    for name in _COMPRESSED:
-        if name in used:
-            raise ShapeFileError(f"{path}: {name} is not read: export it without compression")
-    return document
+        return open_glb(path, data, budget)
+    json = named_json.parse(decode(data, str(path)), str(path))
+    if not is_gltf(json):
+        raise ShapeFileError(f"{path}: a glTF was expected")
+    return open_gltf(path, json, budget=budget)
 
 
 def _choose(document: Document, path: Path, wanted: str) -> int:
@@ -71,17 +78,26 @@ def _choose(document: Document, path: Path, wanted: str) -> int:
     for number, row in enumerate(rows if isinstance(rows, list) else []):
         size = sum(_targets(p) * _vertices(document, p) for p in primitives(document, row, number))
         if size:
-            found.append((number, str(row.get("name")), size))
+            found.append((number, _name_of(document, row, number), size))
     return choose_mesh(path, "morph targets", found, wanted)
 
 
+def _name_of(document: Document, row: Mapping[str, Any], number: int) -> str:
+    """A mesh' name, or that of its node or of the nearest above: packers drop names of meshes."""
+    world = _World(document)
+    node = world.of_mesh(number)
+    names = [row, *(world.rows[n] for n in (world.above(node) if node >= 0 else ()))]
+    found = (named.get("name") for named in names)
+    return next((name for name in found if isinstance(name, str) and name), f"mesh{number}")
+
+
 def primitives(document: Document, row: object, number: int) -> list[dict[str, Any]]:
-    """The primitives of a mesh.
+    """Of a mesh.
 
     Args:
-        document: the file.
-        row: the mesh in it.
-        number: of the mesh.
+        document: of open_document.
+        row: the mesh' table of the JSON.
+        number: of the mesh, for errors.
 
     Raises:
         AnimationFileError: it has none.
@@ -105,10 +121,10 @@ def _vertices(document: Document, primitive: Mapping[str, Any]) -> int:
 
 
 def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
-    """A mesh and its morph targets, as read_gltf gives them; one without targets too.
+    """A mesh and its morph targets, as read_gltf gives them; one without targets or triangles too.
 
     Args:
-        document: the file.
+        document: of open_document.
         number: of the mesh.
 
     Raises:
@@ -116,64 +132,73 @@ def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubl
     """
     row = document.json["meshes"][number]
     place = f"meshes[{number}]"
-    parts = [
-        _Part(document, primitive, f"{place}.primitives[{i}]")
-        for i, primitive in enumerate(primitives(document, row, number))
-    ]
+    parts: list[_Part] = []
+    begins: dict[str, int] = {}  # of vertices that several primitives may share
+    triangles = []
+    total = 0
+    for i, primitive in enumerate(primitives(document, row, number)):
+        at = f"{place}.primitives[{i}]"
+        key = repr([primitive.get(name) for name in ("attributes", "targets", "extensions")])
+        if key not in begins:
+            begins[key] = total
+            parts.append(_Part(document, primitive, at))
+            total += len(parts[-1].positions)
+        part = parts[list(begins).index(key)]
+        triangles.append(part.triangles(document, primitive, at) + begins[key])
     counts = {len(part.deltas) for part in parts}
     if len(counts) != 1:
         raise document.fail(place, "as many morph targets in all primitives were expected")
     names = _names(row, counts.pop())
-    turn = _node_matrix(document, number)[:3]
-    points = np.concatenate([part.positions for part in parts])
-    rows = [np.concatenate(d) for d in zip(*(p.deltas for p in parts), strict=True)]
-    deltas = np.stack(rows) if rows else np.zeros((0, len(points), 3))
-    begins = np.cumsum([0, *(len(part.positions) for part in parts)])
-    corners = np.concatenate([p.corners + b for p, b in zip(parts, begins[:-1], strict=True)])
-    uvs = np.concatenate([part.uvs for part in parts])
-    first, of = _welded(points, deltas)
-    triangles = of[corners]
-    whole = (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)  # none is a line
-    mesh = ObjMesh(
-        points[first] @ turn[:, :3].T + turn[:, 3],
-        uvs,
-        triangles[whole].tolist(),
-        corners[whole].tolist(),
-    )
-    moved = deltas[:, first] @ turn[:, :3].T
+    corners = np.concatenate(triangles)
+    corners = corners[(np.diff(np.sort(corners, axis=1), axis=1) > 0).all(axis=1)]  # none is a line
+    used, order = np.unique(corners, return_inverse=True)
+    corners = order.reshape(-1, 3)
+    turn = _node_matrix(document, number)
+    size = turn[:3, :3]
+    if np.linalg.det(size) < 0:  # a mirror shows the backs of polygons
+        corners = corners[:, ::-1]
+    points = np.concatenate([part.positions for part in parts])[used]
+    uvs = np.concatenate([part.uvs for part in parts])[used]
+    deltas = [
+        np.concatenate(d)[used] @ size.T for d in zip(*(p.deltas for p in parts), strict=True)
+    ]
+    faces = corners.tolist()
+    mesh = ObjMesh(points @ size.T + turn[:3, 3], uvs, faces, faces)
+    mesh, moved = welded(mesh, deltas, all_polygons=False)
     return mesh, dict(zip(names, moved, strict=True))
 
 
 class _Part:
-    """The numbers of a primitive."""
+    """The vertices of a primitive, which others may share."""
 
     def __init__(self, document: Document, primitive: Mapping[str, Any], place: str) -> None:
-        if document.whole(primitive, "mode", place, _TRIANGLES) != _TRIANGLES:
-            raise document.fail(f"{place}.mode", "triangles were expected")
         attributes = primitive.get("attributes")
         given = attributes if isinstance(attributes, dict) else {}
-        at = f"{place}.attributes"
-        self.positions = document.rows(given.get("POSITION"), f"{at}.POSITION", "VEC3")
+        self._packed = packed = _Packed(document, primitive, place)
+        self.positions = packed.rows(given, "POSITION", "VEC3")
         count = len(self.positions)
-        self.uvs = np.zeros((count, 2))
-        if "TEXCOORD_0" in given:
-            found = document.rows(given["TEXCOORD_0"], f"{at}.TEXCOORD_0", "VEC2")
-            self.uvs = np.stack([found[:, 0], 1 - found[:, 1]], axis=1)  # v points down there
-        order: Ints = np.arange(count)
-        if "indices" in primitive:
-            order = document.rows(primitive["indices"], f"{place}.indices", "SCALAR")[:, 0].astype(
-                np.int64
-            )
-        if len(order) % 3 or (len(order) and not 0 <= order.min() <= order.max() < count):
-            raise document.fail(f"{place}.indices", f"triangles of {count} vertices were expected")
-        if len(self.uvs) != count:
-            raise document.fail(f"{at}.TEXCOORD_0", f"{count} rows were expected")
-        self.corners = order.reshape(-1, 3)
+        self.uvs = _uvs(document, primitive, packed, given, count)
         targets = primitive.get("targets")
         self.deltas = [
             self._delta(document, target, f"{place}.targets[{i}]", count)
             for i, target in enumerate(targets if isinstance(targets, list) else [])
         ]
+
+    def triangles(self, document: Document, primitive: Mapping[str, Any], place: str) -> Ints:
+        """int64[n, 3] of a primitive that has these vertices. Raises: AnimationFileError."""
+        if document.whole(primitive, "mode", place, _TRIANGLES) != _TRIANGLES:
+            raise document.fail(f"{place}.mode", "triangles were expected")
+        count, at = len(self.positions), f"{place}.indices"
+        order: Ints = np.arange(count)
+        if self._packed.mesh is not None:
+            order = self._packed.mesh.triangles.ravel()
+        elif "indices" in primitive:
+            rows = document.rows(primitive["indices"], at, "SCALAR", INDICES)
+            order = rows[:, 0].astype(np.int64)
+        document.budget.hold(len(order) * _CORNER_BYTES, at)
+        if len(order) % 3 or (len(order) and not 0 <= order.min() <= order.max() < count):
+            raise document.fail(at, f"triangles of {count} vertices were expected")
+        return order.reshape(-1, 3)
 
     @staticmethod
     def _delta(document: Document, target: object, place: str, count: int) -> Doubles:
@@ -185,6 +210,96 @@ class _Part:
         if len(delta) != count:
             raise document.fail(place, f"{count} rows were expected, found {len(delta)}")
         return delta
+
+
+class _Packed:
+    """The attributes of a primitive, whether Draco packed them or not."""
+
+    def __init__(self, document: Document, primitive: Mapping[str, Any], place: str) -> None:
+        self._document, self._place = document, place
+        extensions = primitive.get("extensions")
+        table = extensions.get(DRACO) if isinstance(extensions, dict) else None
+        self.mesh, self._numbers = None, {}
+        if isinstance(table, dict):
+            self.mesh = document.draco(table, place)
+            numbers = table.get("attributes")
+            self._numbers = numbers if isinstance(numbers, dict) else {}
+
+    def rows(self, given: Mapping[str, Any], name: str, kind: str) -> Doubles:
+        """float64[V, n] of an attribute.
+
+        Raises: AnimationFileError: it is not there, of another kind, or of another length.
+        """
+        at = f"{self._place}.attributes.{name}"
+        if self.mesh is None or name not in self._numbers:
+            accessor = self._document.item("accessors", given.get(name), at)
+            if "bufferView" not in accessor and "sparse" not in accessor:
+                needed = self._document.json.get("extensionsRequired")
+                why = f"; the file requires {_listed(needed)}" if needed else ""
+                raise self._document.fail(at, f"a bufferView was expected, found none{why}")
+            return self._document.rows(given.get(name), at, kind)
+        accessor = self._document.item("accessors", given.get(name), at)
+        try:
+            found = self.mesh.rows(self._numbers[name])
+        except GivenError as error:
+            raise self._document.fail(at, str(error)) from None
+        count = self._document.whole(accessor, "count", f"accessors[{given.get(name)}]")
+        shape = (count, {"VEC2": 2, "VEC3": 3}[kind])
+        if found.shape != shape:
+            raise self._document.fail(
+                at, f"{shape[0]} rows of {shape[1]} numbers were expected, found {found.shape}"
+            )
+        if not np.isfinite(found).all():
+            raise self._document.fail(at, "finite numbers were expected")
+        return found
+
+
+def _listed(names: object) -> str:
+    return ", ".join(str(n)[:60] for n in names[:4]) if isinstance(names, list) else shown(names)
+
+
+def _uvs(
+    document: Document,
+    primitive: Mapping[str, Any],
+    packed: _Packed,
+    given: Mapping[str, Any],
+    count: int,
+) -> Doubles:
+    """float64[V, 2] as the colour's texture takes them, v up; zeros for none."""
+    texture = _texture(document, primitive)
+    extensions = texture.get("extensions")
+    change = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
+    change = change if isinstance(change, dict) else {}
+    wanted = change.get("texCoord", texture.get("texCoord", 0))
+    name = next((n for n in (f"TEXCOORD_{wanted}", "TEXCOORD_0") if n in given), "")
+    if not name:
+        return np.zeros((count, 2))
+    found = packed.rows(given, name, "VEC2")
+    if len(found) != count:
+        raise document.fail(f"primitives.attributes.{name}", f"{count} rows were expected")
+    place = "KHR_texture_transform"
+    found = found * _numbers(document, change, "scale", [1.0, 1.0], place)
+    angle = _numbers(document, {"rotation": [change.get("rotation", 0)]}, "rotation", [0], place)
+    cos, sin = float(np.cos(angle[0])), float(np.sin(angle[0]))
+    found = found @ np.array([[cos, -sin], [sin, cos]])
+    found = found + _numbers(document, change, "offset", [0.0, 0.0], place)
+    if not np.abs(found).max(initial=0.0) <= _FURTHEST_UV:
+        raise document.fail(
+            f"primitives.attributes.{name}",
+            f"texture coordinates up to {_FURTHEST_UV:g} were expected, found "
+            f"{np.abs(found).max():g}",
+        )
+    return np.stack([found[:, 0], 1 - found[:, 1]], axis=1)  # v points down there
+
+
+def _texture(document: Document, primitive: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The table of the colour's texture of a primitive's material; an empty one for none."""
+    if "material" not in primitive:
+        return {}
+    material = document.item("materials", primitive["material"], "primitives.material")
+    colour = material.get("pbrMetallicRoughness")
+    texture = colour.get("baseColorTexture") if isinstance(colour, dict) else None
+    return texture if isinstance(texture, dict) else {}
 
 
 def _names(row: Mapping[str, Any], count: int) -> list[str]:
@@ -201,67 +316,110 @@ def _names(row: Mapping[str, Any], count: int) -> list[str]:
     return out
 
 
-def _welded(points: Doubles, deltas: Doubles) -> tuple[Ints, Ints]:
-    """One of each vertex that lies and moves alike, in the file's order; and which one each is."""
-    keys = np.concatenate([points, deltas.transpose(1, 0, 2).reshape(len(points), -1)], axis=1)
-    keys = np.ascontiguousarray(keys.astype(np.float32)) + np.float32(0.0)  # -0 is 0
-    rows = keys.view(np.dtype((np.void, keys.shape[1] * keys.itemsize))).ravel()
-    _, first, of = np.unique(rows, return_index=True, return_inverse=True)
-    order = np.argsort(first, kind="stable")
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return first[order], place[of.ravel()]
-
-
 def _node_matrix(document: Document, mesh: int) -> Doubles:
-    """float64[4, 4] of the first node with the mesh in the world; one for a mesh that none has."""
-    nodes = document.json.get("nodes")
-    rows = nodes if isinstance(nodes, list) else []
-    # What is skinned stands where its joints are, which rest as the mesh lies.
-    found = next((n for n, node in enumerate(rows) if isinstance(node, dict)
-                  and node.get("mesh") == mesh and "skin" not in node), -1)  # fmt: skip
-    return world_matrix(document, found)
+    """float64[4, 4] from a mesh' numbers to the world: by the first node that has it, or as its
+    skin was bound; no change for a mesh that no node has."""
+    world = _World(document)
+    found = world.of_mesh(mesh)
+    if found < 0:
+        return np.eye(4)
+    if "skin" in world.rows[found]:
+        return _bound(document, world, world.rows[found]["skin"], f"nodes[{found}].skin")
+    return world.matrix(found)
 
 
-def world_matrix(document: Document, found: int) -> Doubles:
-    """float64[4, 4] of a node in the world.
+def world_matrix(document: Document, node: int) -> Doubles:
+    """float64[4, 4] from a node to the world; no change for a number below 0.
 
     Args:
-        document: the file.
-        found: number of the node; below 0: none, which stands nowhere else.
+        document: of open_document.
+        node: its number.
 
     Raises:
-        AnimationFileError: a node that is damaged; with the place in it.
+        AnimationFileError: it hangs on itself, or a node's place is no numbers.
     """
-    nodes = document.json.get("nodes")
-    rows = nodes if isinstance(nodes, list) else []
-    parents: dict[int, int] = {}
-    for number, node in enumerate(rows):
-        if not isinstance(node, dict):
-            raise document.fail(f"nodes[{number}]", "a table was expected")
-        children = node.get("children")
-        for child in children if isinstance(children, list) else []:
-            if isinstance(child, int):
-                parents[child] = number
-    out = np.eye(4)
-    for _ in range(len(rows)):
-        if found < 0:
-            break
-        out = _local(document, rows[found], f"nodes[{found}]") @ out
-        found = parents.get(found, -1)
-    return out
+    return _World(document).matrix(node) if node >= 0 else np.eye(4)
+
+
+class _World:
+    """Where nodes are."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        nodes = document.json.get("nodes")
+        self.rows: list[dict[str, Any]] = nodes if isinstance(nodes, list) else []
+        document.budget.work(len(self.rows), "nodes")
+        self._parents: dict[int, int] = {}
+        for number, node in enumerate(self.rows):
+            if not isinstance(node, dict):
+                raise document.fail(f"nodes[{number}]", "a table was expected")
+            children = node.get("children")
+            for child in children if isinstance(children, list) else []:
+                if isinstance(child, int):
+                    self._parents[child] = number
+
+    def of_mesh(self, mesh: int) -> int:
+        """The first node that has a mesh; -1 for none."""
+        return next((n for n, row in enumerate(self.rows) if row.get("mesh") == mesh), -1)
+
+    def above(self, node: int) -> list[int]:
+        """A node and all above it, the root last. Raises: AnimationFileError: a circle."""
+        out = [node]
+        while out[-1] in self._parents:
+            out.append(self._parents[out[-1]])
+            if len(out) > _DEEPEST:
+                what = f"it hangs on itself, or below more than {_DEEPEST} nodes"
+                raise self._document.fail(f"nodes[{node}]", what)
+        return out
+
+    def matrix(self, node: int) -> Doubles:
+        """float64[4, 4] from a node to the world."""
+        out = np.eye(4)
+        for number in self.above(node):
+            out = _local(self._document, self.rows[number], f"nodes[{number}]") @ out
+        return out
+
+
+def _bound(document: Document, world: _World, index: object, place: str) -> Doubles:
+    """float64[4, 4] from a skinned mesh to the world as it was bound, where the joint that is
+    nearest to the root stands; the mesh' own node says nothing, and other joints may be posed."""
+    skin = document.item("skins", index, place)
+    joints, at = skin.get("joints"), f"skins[{index}]"
+    if not isinstance(joints, list) or not joints:
+        raise document.fail(f"{at}.joints", f"nodes were expected, found {shown(joints)}")
+    for joint in joints:
+        document.item("nodes", joint, f"{at}.joints")
+    top = min(range(len(joints)), key=lambda j: len(world.above(joints[j])))
+    out = world.matrix(joints[top])
+    if "inverseBindMatrices" not in skin:
+        return out
+    rows = document.rows(skin["inverseBindMatrices"], f"{at}.inverseBindMatrices", "MAT4", FLOATS)
+    if len(rows) < len(joints):
+        raise document.fail(
+            f"{at}.inverseBindMatrices", f"{len(joints)} were expected, found {len(rows)}"
+        )
+    return out @ rows[top].reshape(4, 4).T
+
+
+def _numbers(
+    document: Document, table: Mapping[str, Any], key: str, default: list[float], place: str
+) -> Doubles:
+    """As many finite numbers of a table as the default has. Raises: AnimationFileError."""
+    value = table.get(key, default)
+    try:
+        found = several(value, finite)
+    except GivenError:
+        found = ()
+    if len(found) != len(default):
+        raise document.fail(
+            f"{place}.{key}", f"{len(default)} finite numbers were expected, found {shown(value)}"
+        )
+    return np.array(found, np.float64)
 
 
 def _local(document: Document, node: Mapping[str, Any], place: str) -> Doubles:
     def numbers(key: str, default: list[float]) -> Doubles:
-        value = node.get(key, default)
-        try:
-            found = several(value, finite)
-        except GivenError:
-            found = ()
-        if len(found) != len(default):
-            raise document.fail(f"{place}.{key}", f"{len(default)} finite numbers were expected")
-        return np.array(found, np.float64)
+        return _numbers(document, node, key, default, place)
 
     if "matrix" in node:
         return numbers("matrix", [0.0] * 16).reshape(4, 4).T

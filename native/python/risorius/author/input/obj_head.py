@@ -11,6 +11,7 @@ from ..heads.parts import HeadPart
 from .matching import guess
 from .mtl import with_materials
 from .obj import ObjMesh, ShapeFileError, read_obj, read_positions
+from .welding import welded
 
 _NEUTRAL = ("neutral", "basis", "base", "rest", "default", "head", "face")
 
@@ -62,6 +63,8 @@ def read_obj_head(neutral: Path, folder: Path, *, others: bool) -> list[HeadPart
         raise ShapeFileError(
             f"{folder}: a folder of OBJ files was expected, one for each expression"
         )
+    face.mesh, moved = welded(mesh, list(face.shapes.values()))
+    face.shapes = dict(zip(face.shapes, moved, strict=True))
     return [*with_materials(neutral, face), *out]
 
 

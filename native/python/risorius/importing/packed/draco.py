@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""Meshes of glTF that Draco packed: KHR_draco_mesh_compression, by the package DracoPy.
+
+Vertices come in the order of the packed data. Morph targets are never packed by Draco; the
+extension asks writers to keep them in that order.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...base.errors import RisoriusError
+from ...base.given import GivenError
+
+EXTENSION = "KHR_draco_mesh_compression"
+
+
+class MissingDracoError(RisoriusError):
+    """The package that reads Draco is not installed."""
+
+    code = "missing_draco"
+
+
+class DracoMesh:
+    """A mesh that was unpacked.
+
+    Attributes:
+        triangles: int64[n, 3].
+    """
+
+    def __init__(self, packed: bytes) -> None:
+        """Unpacks.
+
+        Args:
+            packed: the bytes that the file holds.
+
+        Raises:
+            MissingDracoError: DracoPy is not installed.
+            GivenError: bytes that are no mesh of Draco.
+        """
+        try:
+            package: Any = importlib.import_module("DracoPy")
+        except ImportError:
+            raise MissingDracoError(
+                f"{EXTENSION}: `pip install DracoPy` reads it, or export the mesh without "
+                "compression"
+            ) from None
+        try:
+            self._mesh = package.decode(packed)
+            faces = np.asarray(self._mesh.faces, np.int64).reshape(-1, 3)
+        except (package.FileTypeException, ValueError, TypeError, MemoryError) as error:
+            raise GivenError(f"{EXTENSION}: a mesh of Draco was expected: {error}") from None
+        self.triangles: npt.NDArray[np.int64] = faces
+
+    def rows(self, identity: object) -> npt.NDArray[np.float64]:
+        """float64[V, n] of the attribute of that number.
+
+        Raises:
+            GivenError: there is none.
+        """
+        found = [row for row in self._mesh.attributes if row["unique_id"] == identity]
+        if not found or isinstance(identity, bool):
+            known = ", ".join(str(row["unique_id"]) for row in self._mesh.attributes)
+            raise GivenError(f"{EXTENSION}: an attribute of {known} was expected, found {identity}")
+        values = np.asarray(found[0]["data"])
+        return values.reshape(len(values), -1).astype(np.float64)

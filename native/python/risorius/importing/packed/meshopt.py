@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: MIT
+"""Buffer views of glTF that meshoptimizer packed: EXT_meshopt_compression, and its successor of the
+same words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ... import _native
+from ...base.given import GivenError, shown, text, whole
+
+EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
+FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL")
+_WIDEST = 256  # bytes of a row
+
+
+@dataclass(frozen=True)
+class Packing:
+    """How a buffer view is packed.
+
+    Attributes:
+        name: the extension's.
+        table: its own: buffer, byteOffset and byteLength say where the packed bytes are.
+        count, stride: rows, and bytes of each, once they are unpacked.
+        mode, filter: of MODES and FILTERS.
+    """
+
+    name: str
+    table: Mapping[str, Any]
+    count: int
+    stride: int
+    mode: str
+    filter: str
+
+    @property
+    def size(self) -> int:
+        """Bytes once they are unpacked."""
+        return self.count * self.stride
+
+
+def packing_of(view: Mapping[str, Any]) -> Packing | None:
+    """How a buffer view is packed, or None where it is not.
+
+    Args:
+        view: the table of the JSON.
+
+    Raises:
+        GivenError: an entry of the extension that is not allowed; the sentence begins with it.
+    """
+    found = view.get("extensions")
+    extensions = found if isinstance(found, dict) else {}
+    for name in EXTENSIONS:
+        table = extensions.get(name)
+        if table is None:
+            continue
+        if not isinstance(table, dict):
+            raise GivenError(f"{name}: a table was expected, found {shown(table)}")
+        return Packing(
+            name,
+            table,
+            _whole(name, table, "count"),
+            _whole(name, table, "byteStride", _WIDEST),
+            _word(name, table, "mode", MODES),
+            _word(name, table, "filter", FILTERS) if "filter" in table else FILTERS[0],
+        )
+    return None
+
+
+def unpacked(packed: bytes, packing: Packing) -> bytes:
+    """The bytes of a buffer view, packing.size of them.
+
+    Args:
+        packed: the bytes that the file holds.
+        packing: of packing_of.
+
+    Raises:
+        GivenError: bytes of another kind, damaged ones, or rows that the mode does not have.
+    """
+    try:
+        return _native.unpack_buffer(
+            packed, packing.count, packing.stride, packing.mode, packing.filter
+        )
+    except ValueError as error:
+        raise GivenError(f"{packing.name}: {error}") from None
+
+
+def _whole(name: str, table: Mapping[str, Any], key: str, high: int = 1 << 31) -> int:
+    try:
+        return whole(table.get(key), 0, high)
+    except GivenError as error:
+        raise GivenError(f"{name}.{key}: {error}") from None
+
+
+def _word(name: str, table: Mapping[str, Any], key: str, known: tuple[str, ...]) -> str:
+    try:
+        found = text(table.get(key))
+    except GivenError as error:
+        raise GivenError(f"{name}.{key}: {error}") from None
+    if found not in known:
+        raise GivenError(
+            f"{name}.{key}: one of {', '.join(known)} was expected, found {shown(found)}"
+        )
+    return found
