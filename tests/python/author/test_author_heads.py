@@ -168,6 +168,22 @@ def test_eyes_turn_with_look_controls_by_usual_angles_or_by_those_of_the_shapes(
     assert found.kept == ("eyeLeft_lod", "eyeRight_lod")
 
 
+def test_what_is_drawn_or_shut_with_the_lids_is_no_ball(tmp_path):
+    whole, *_ = made("Face Cap")
+    points, faces = likenesses.joined(*likenesses.eyes())
+    middle = likenesses.EYE[2]
+    sockets = likenesses.mesh("eyes", (points * [1, 1, -1] + [0, 0, 2 * middle], faces))
+    sockets["faces"] = faces[(sockets["points"][faces][:, :, 2] < middle + 0.1).all(axis=1)]
+    used = np.unique(sockets["faces"])
+    place = np.zeros(len(points), int)
+    place[used] = np.arange(len(used))
+    sockets |= {"points": sockets["points"][used], "faces": place[sockets["faces"]]}
+    squash = (points - [0, likenesses.EYE[1], 0]) * [0, -0.9, 0]
+    drawn = likenesses.mesh("eyes", (points, faces), {"eyeBlink_L": squash})
+    for eyes in (sockets, drawn):
+        assert list(read(saved(tmp_path, [whole, eyes])).dna.joint_names) == ["root", "head"]
+
+
 def test_a_lopsided_head_stays_as_it_is(tmp_path):
     even = centimetres(read(saved(tmp_path, made("Ready Player Me"), "-z")).dna)
     found = read(saved(tmp_path, likenesses.ready_player(lopsided=True), "-z"))

@@ -24,6 +24,7 @@ _NAMED_ROUND = 0.18  # of the radius, of what is called an eye: corneas bulge
 _SIZES = (0.02, 0.16)  # radius, of the face's height
 _INSIDE = 1.1  # of the radius: what lies within turns with the eye
 _NONE = np.zeros(0, np.int64)
+_FRONT, _SQUASH = 0.6, 0.25  # of the radius
 _LEAST_ANGLE = 0.03  # radians: what turns an eye less is none
 _NO_TURN = 0.4  # of a shape's motion: what leaves more of it when an eye turns is no turn
 _HELD, _CHIN = 0.7, 0.4  # of the jaw's motion, of its lowest: what is rigid there
@@ -96,9 +97,30 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
         if len(own) < 12 or np.ptp(points[own], axis=0).max() > 4 * _SIZES[1] * height:
             continue
         ball = ball_of(points, own, _NAMED_ROUND) if named else ball_of(points, own)
-        if ball is not None and _SIZES[0] * height < ball.radius < _SIZES[1] * height:
+        if ball is None or not _SIZES[0] * height < ball.radius < _SIZES[1] * height:
+            continue
+        if _looks_out(points, ball) and not _is_squashed(part, ball):
             out.append(ball)
     return out
+
+
+def _looks_out(points: Doubles, ball: Ball) -> bool:
+    """Whether a ball has its front, as no socket has that is drawn as the white of an eye."""
+    return bool(points[ball.vertices, 2].max() > ball.middle[2] + _FRONT * ball.radius)
+
+
+def _is_squashed(part: HeadPart, ball: Ball) -> bool:
+    """Whether a shape changes most of a ball's form, as lids do that are joined to a drawn eye."""
+    before = part.mesh.positions[ball.vertices]
+    for delta in part.shapes.values():
+        own = delta[ball.vertices]
+        if np.abs(own).max() < _SQUASH * ball.radius:
+            continue
+        rotation, moved = rigid_fit(before, before + own)
+        rest = before @ rotation.T + moved - before - own
+        if np.median(np.linalg.norm(rest, axis=1)) > _SQUASH * ball.radius:
+            return True
+    return False
 
 
 def _pair(
