@@ -13,6 +13,7 @@ import pytest
 import risorius
 from risorius import _native
 from risorius.author.geometry import skeleton as sk
+from risorius.base.budget import BudgetError
 from risorius.base.errors import ArgumentError
 from risorius.lightening import lighten
 
@@ -206,6 +207,10 @@ def test_faces_that_cannot_be_lighter_are_refused(face, tmp_path):
     bare.meshes = []
     with pytest.raises(ArgumentError, match="a face with meshes was expected"):
         lighten(bare, joints=20)
+    many = copy.copy(face)
+    many.raw_control_names = [*face.raw_control_names, *(f"c{i}" for i in range(50_000))]
+    with pytest.raises(BudgetError, match="50,015 controls in 50,024 poses"):
+        lighten(many, joints=20)
     with pytest.raises(risorius.DnaError, match="stopped"):
         lighten(face, joints=20, progress=lambda share: share < 0.3)
 

@@ -17,6 +17,7 @@ from typing import Any
 import risorius
 
 from ..base import toml
+from ..base.budget import BudgetError
 from ..base.errors import ArgumentError
 from ..base.reading import TEXT
 from ..base.words import counted
@@ -337,7 +338,7 @@ def run_lighten(args: argparse.Namespace) -> int:
             keep=[name for name in args.keep.split(",") if name],
             shapes_mm=args.shapes,
         )
-    except ArgumentError as error:
+    except (ArgumentError, BudgetError) as error:
         raise InputError(f"{label(args.input)}: {error}") from error
     with warnings_as_lines(label(args.input)):
         data = dna.to_bytes(version=version_of(source, dna, False))

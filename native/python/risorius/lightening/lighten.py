@@ -154,13 +154,13 @@ def lighten(
         raise ArgumentError("joints, correctives or lods: one at least was expected")
     require_sizes(dna)
     _require_finite(dna)
+    _check_size(dna)
     levels = _levels(dna, lods)
     before = Size.of(dna, len(dna.to_bytes()), Rig(dna))
     source = dna.filter_lods(levels) if len(levels) < dna.lod_count else copy.copy(dna)
     _require_parts(source, joints, correctives, keep)
     rig = Rig(source)
     poses = poses_of(source, rig)
-    _check_size(source, len(poses))
     work = _Work(source, poses, middle_of(source), _part(progress, 0.0, 0.1))
     leaving = [] if correctives is None else _fewer_correctives(work, rig, correctives)
     fewer = _without(source, leaving)
@@ -221,10 +221,14 @@ def _require_parts(
         require_count(dna, joints, needed)
 
 
-def _check_size(dna: Dna, poses: int) -> None:
+def _check_size(dna: Dna) -> None:
     """Raises BudgetError where tables would be far larger than the face."""
     budget = Budget(_BASE_BYTES + _BYTES_PER_BYTE * dna.size_in_bytes(), 0)
-    joints = len(dna.joint_names)
+    joints, raw = len(dna.joint_names), len(dna.raw_control_names)
+    poses = raw + dna.psd_count
+    budget.hold(2 * 4 * raw * poses, f"{raw:,} controls in {poses:,} poses")
+    inputs = sk.column_count(dna)
+    budget.hold(8 * 9 * joints * inputs, f"{joints:,} joints that {inputs:,} inputs move")
     most = max((len(mesh.positions) for mesh in dna.meshes), default=0)
     budget.hold(8 * 12 * joints * poses, f"{joints:,} joints in {poses:,} poses")
     budget.hold(4 * 8 * 16 * joints * joints, f"pairs of {joints:,} joints")
