@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Joint rigs from expressions: what the written file does, by a reader of its own, and refusals."""
 
+import copy
 import importlib.util
 import itertools
 import json
@@ -32,7 +33,8 @@ from risorius.author.geometry.simplify import (
     simplified,
 )
 from risorius.author.input import matching, shape_face, spec
-from risorius.author.level_meshes import shape_of
+from risorius.author.level_meshes import level_meshes, shape_of
+from risorius.author.work import begin
 from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
@@ -180,6 +182,34 @@ def test_levels_end_before_the_picture_breaks(folder, tmp_path):
             slivers, folds = shape_of(points, triangles)
             assert slivers <= 0.02
             assert folds <= 0.045
+
+
+def test_hair_of_more_vertices_than_the_skin_ends_no_level():
+    """A head whose hair is a mesh of cards: the levels are those of the head alone."""
+    positions, faces = face_shapes.head()
+    moved = face_shapes.expressions(positions)
+    shapes = shape_face.ShapeSet(
+        "egg", shape_face.ObjMesh(positions, np.zeros((0, 2)), faces.tolist()), moved
+    )
+    alone = shape_face.make_shape_face(shapes, {name: [name] for name in moved})
+    hairy = copy.copy(alone)
+    card = np.array([[0, 0, 0], [0, -4, 0], [0.4, -4, 0], [0.4, 0, 0]])
+    roots = np.stack([np.linspace(-8, 8, 300), np.full(300, 13.0), np.zeros(300)], axis=1)
+    points = (roots[:, None] + card).reshape(-1, 3)
+    quads = np.arange(1200).reshape(-1, 4).tolist()
+    hair = polygon_mesh(points, points, quads, points[:, :2], quads)
+    hair.skin_offsets, hair.skin_weights = np.arange(1201), np.ones(1200)
+    hair.skin_joint_indices, hair.maximum_influence_per_vertex = np.ones(1200, int), 1
+    hairy.meshes = [*alone.meshes, hair]
+    hairy.mesh_names = [*alone.mesh_names, "hair_lod0_mesh"]
+    hairy.lod_mesh_mapping = [[0, 1]]
+    plans = []
+    for dna in (alone, hairy):
+        work = begin(dna)
+        plans.append(level_meshes(work, work.wanted, LodOptions(), 8))
+    assert plans[0].count == plans[1].count == 4
+    assert plans[0].ended == plans[1].ended
+    assert [len(plans[1].triangles[lod, 1]) for lod in (1, 2, 3)] == [360, 216, 130]
 
 
 def test_pieces_of_a_mesh_stay_whole_or_go_together():

@@ -58,7 +58,8 @@ def level_meshes(
            for lod in range(had)]  # fmt: skip
     budgets = vertex_budgets(options, levels, own)
     fine = listed_meshes(source, 0)
-    skin = max(fine, key=lambda m: len(source.meshes[m].positions))
+    # Hair may have more vertices than the skin; nothing has more to do.
+    skin = max(fine, key=lambda m: float(np.vdot(wanted[m], wanted[m])))
     out, check = LevelMeshes(min(levels, had)), _Skin(source.meshes[skin], wanted[skin])
     attributes: dict[int, Floats] = {}
     for lod in range(had, levels):
@@ -84,7 +85,7 @@ def level_meshes(
 
 
 class _Skin:
-    """The mesh with most vertices: its largest piece, at rest and in some expressions."""
+    """The mesh that moves most: its largest piece, at rest and in some expressions."""
 
     def __init__(self, mesh: Mesh, wanted: Doubles) -> None:
         self.positions = np.asarray(mesh.positions, np.float64)
