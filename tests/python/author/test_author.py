@@ -209,7 +209,10 @@ def test_hair_of_more_vertices_than_the_skin_ends_no_level():
         plans.append(level_meshes(work, work.wanted, LodOptions(), 8))
     assert plans[0].count == plans[1].count == 4
     assert plans[0].ended == plans[1].ended
-    assert [len(plans[1].triangles[lod, 1]) for lod in (1, 2, 3)] == [360, 216, 130]
+    for lod, share in ((1, 0.6), (2, 0.36), (3, 0.216)):
+        cards = len(plans[1].triangles[lod, 1]) / 2
+        assert cards == int(cards)  # each is whole
+        assert share * 300 < cards < share**0.5 * 300
 
 
 def test_pieces_of_a_mesh_stay_whole_or_go_together():

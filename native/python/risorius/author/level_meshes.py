@@ -17,9 +17,9 @@ from .work import Work, listed_meshes
 _POSES = 6  # the expressions that move most, looked at beside the face that rests
 _LOOKED_AT = 2000  # vertices of the fine skin
 # What a level may have: distances are shares of the skin's size.
-_RMS, _FARTHEST = 0.007, 0.025
+_RMS, _FARTHEST = 0.005, 0.015
 _SLIVERS, _LONG = 0.02, 30.0  # triangles that are so many times as long as high
-_FOLDS, _FOLDED = 0.045, -0.5  # edges, and the cosine of 120 degrees
+_FOLDS, _FOLDED = 0.03, -0.5  # edges, and the cosine of 120 degrees
 
 
 @dataclass

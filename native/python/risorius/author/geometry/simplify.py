@@ -21,6 +21,7 @@ _STUCK = 1.5  # times the vertices that were asked for: seams are given up
 # smaller than a share of the mesh all go at once when less would be left of them.
 _LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
 _CARD, _MANY = 16, 60  # vertices of a card of hair at most, and how many make hair
+_THINNED = 0.6  # the power of its share: a head goes bald sooner than it goes flat
 
 Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.uint32]
@@ -133,7 +134,7 @@ def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
     if share * counts[small].sum() < _GONE * small.sum():
         out[small] = 0
     # Of hair fewer cards stay, whole and evenly, which thins it.
-    among = min(len(cards), round(share * len(cards)))
+    among = min(len(cards), round(share**_THINNED * len(cards)))
     out[cards] = 0
     stay = cards[np.arange(among) * len(cards) // max(1, among)]
     out[stay] = counts[stay]
