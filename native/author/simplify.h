@@ -31,8 +31,9 @@ struct Simplified {
 
 /// A surface with about so many triangles: edges are collapsed where that changes least, corners
 /// are never moved. Seams and borders stay where they are; where nothing more can be collapsed it
-/// has more triangles than asked for. In: triangles  at most Fails: kInvalidLength (attributes),
-/// kInvalidIndex (a triangle's corner), kInvalidValue (a number
+/// has more triangles than asked for. Of two flat triangles of which one is a sliver the common
+/// edge is turned. In: triangles  at most Fails: kInvalidLength (attributes), kInvalidIndex (a
+/// triangle's corner), kInvalidValue (a number
 ///        that is not finite), kInvalidArgument (more than 32 attributes)
 /// Source: Garland and Heckbert, "Surface Simplification Using Quadric Error Metrics" (1997), by
 /// the

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Dna -> Dna operations.
 #include "bindings/fields.h"
+#include "dna/convert/lods.h"
 #include "edit/regroup.h"
 
 namespace risorius::bindings {
@@ -23,6 +24,15 @@ py::tuple regroup(const dna::Dna& dna, const JointLists& regions, double transla
   }();
   edit::Regrouped out = unwrap(std::move(result));
   return py::make_tuple(std::make_shared<dna::Dna>(std::move(out.dna)), std::move(out.report));
+}
+
+std::shared_ptr<dna::Dna> keep_parts(const dna::Dna& dna, const std::vector<bool>& joints,
+                                     const std::vector<bool>& correctives) {
+  auto result = [&] {
+    const py::gil_scoped_release released;
+    return dna::keep_parts(dna, joints, correctives);
+  }();
+  return std::make_shared<dna::Dna>(unwrap(std::move(result)));
 }
 
 template <class Change>
@@ -69,6 +79,10 @@ void bind_edit(py::module_& m) {
         py::arg("translation_mm"), py::arg("rotation_degrees"), py::arg("scale"),
         py::arg("foreign_share"), py::arg("combinations"), py::arg("seed"), py::arg("timed"),
         "(Dna, RegroupReport): see risorius.rigs.edit.regroup.");
+  m.def("keep_parts", &keep_parts, py::arg("dna"), py::kw_only(), py::arg("joints"),
+        py::arg("correctives"),
+        "A copy with the joints and correctives alone that are True; every index counts in what is "
+        "left.");
 }
 
 }  // namespace risorius::bindings

@@ -40,7 +40,7 @@ using core::fail;
 using core::List;
 using Indices = std::vector<std::uint16_t>;
 
-IndexMap controls_that_stay(const Dna& dna) {
+std::vector<bool> controls_that_stay(const Dna& dna) {
   const ControlCounts n = control_counts(dna);
   std::vector<bool> keep;
   const auto part = [&](std::uint32_t count, std::uint32_t unread) {
@@ -51,7 +51,7 @@ IndexMap controls_that_stay(const Dna& dna) {
   part(n.psd, dna.unread_controls.psd);
   part(n.ml, dna.unread_controls.ml);
   part(n.rbf_pose, dna.unread_controls.rbf_pose);
-  return IndexMap(keep);
+  return keep;
 }
 
 std::vector<bool> kept_entries(const IndexMap& map, const Array<std::uint16_t>& indices) {
@@ -200,8 +200,13 @@ void drop_layer(std::string_view id, Dna& dna) {
 
 core::Result<std::size_t> forget_unread_controls(Dna& dna) {
   if (dna.unread_controls == UnreadControls{}) return std::size_t{0};
-  const IndexMap map = controls_that_stay(dna);
+  const std::vector<bool> keep = controls_that_stay(dna);
   dna.unread_controls = {};
+  return forget_controls(keep, dna);
+}
+
+core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna) {
+  const IndexMap map(keep);
   return Forgetting(map, dna).run();
 }
 

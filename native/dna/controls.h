@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <vector>
 
 #include "core/result.h"
 #include "dna/dna.h"
@@ -34,6 +35,11 @@ void drop_layer(std::string_view id, Dna& dna);
 /// entries of channels and maps, correctives with such a factor. Out: how many of these went.
 /// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control).
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
+
+/// The same for any controls: those that are not kept go, the others close the gaps. The caller
+/// sets the counts of the parts that lose some. In: keep  [controls], raw ones are all kept Fails:
+/// kInvalidArgument (a network, a pose or a setup reads or writes one that goes)
+core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna);
 
 }  // namespace detail
 }  // namespace risorius::dna

@@ -534,6 +534,75 @@ core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna) {
   return out;
 }
 
+namespace {
+
+core::Status check_parts(const Dna& dna, const std::vector<bool>& joints,
+                         const std::vector<bool>& correctives) {
+  using core::ErrorCode;
+  const Definition& d = dna.definition;
+  if (dna.descriptor.lod_count == 0) {
+    return core::fail(ErrorCode::kInvalidArgument, "descriptor.lod_count",
+                      "a level of detail at least was expected");
+  }
+  if (joints.size() != d.joint_names.size() || correctives.size() != dna.behavior.psd_count) {
+    return core::fail(ErrorCode::kInvalidLength,
+                      joints.size() == d.joint_names.size() ? "correctives" : "joints",
+                      "one value for each was expected");
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!joints[j] || joints[d.joint_parents[j]]) continue;
+    return core::fail(ErrorCode::kInvalidArgument, "joints",
+                      "joint " + std::to_string(j) + " cannot stay without its parent");
+  }
+  return core::ok();
+}
+
+// Channels that are driven, and by correctives that go alone.
+std::vector<bool> kept_channels(const Dna& dna, const std::vector<bool>& controls) {
+  const BlendShapeChannels& s = dna.behavior.blend_shape_channels;
+  std::vector<bool> keep(dna.definition.blend_shape_channel_names.size(), true);
+  for (const std::uint16_t channel : s.output_indices) keep[channel] = false;
+  for (std::size_t i = 0; i < s.output_indices.size(); ++i) {
+    if (controls[s.input_indices[i]]) keep[s.output_indices[i]] = true;
+  }
+  return keep;
+}
+
+}  // namespace
+
+core::Result<Dna> keep_parts(const Dna& dna, const std::vector<bool>& joints,
+                             const std::vector<bool>& correctives) {
+  std::vector<Warning> unused;
+  RISORIUS_TRY(validate(dna, unused));
+  RISORIUS_TRY(check_parts(dna, joints, correctives));
+  Dna out = dna;
+  const ControlCounts counts = control_counts(dna);
+  std::vector<bool> controls(counts.total(), true);
+  for (std::size_t i = 0; i < correctives.size(); ++i) controls[counts.raw + i] = correctives[i];
+  const auto all = [](std::size_t n) { return detail::IndexMap(std::vector<bool>(n, true)); };
+  detail::LodPlan plan;
+  const Definition& d = dna.definition;
+  for (std::uint16_t lod = 0; lod < dna.descriptor.lod_count; ++lod) plan.lods.push_back(lod);
+  plan.blend_shape_channels = detail::IndexMap(kept_channels(dna, controls));
+  plan.joints = detail::IndexMap(joints);
+  plan.meshes = all(d.mesh_names.size());
+  plan.animated_maps = all(d.animated_map_names.size());
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (!joints[j] || d.joint_parents[j] != j) continue;
+    plan.root = plan.joints[j];
+    break;
+  }
+  if (auto dropped = detail::forget_controls(controls, out); !dropped) {
+    return std::move(dropped).propagate();
+  }
+  const auto gone = static_cast<std::uint16_t>(std::ranges::count(correctives, false));
+  out.behavior.psd_count = static_cast<std::uint16_t>(out.behavior.psd_count - gone);
+  out.behavior.joint_column_count = static_cast<std::uint16_t>(
+      out.behavior.joint_column_count - std::min(gone, out.behavior.joint_column_count));
+  RISORIUS_TRY(detail::apply(plan, false, out));
+  return out;
+}
+
 core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection) {
   std::vector<Warning> unused;
   RISORIUS_TRY(validate(dna, unused));

@@ -33,6 +33,17 @@ core::Result<Dna> filter_lods(const Dna& dna, const LodSelection& selection);
 /// A copy without the channels of controls that no loaded layer provides, nor those in no LOD.
 core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna);
 
+/// A copy without some joints and correctives; every index counts in what is left. With a joint its
+/// rows of joint groups go and its weights (the other joints of a vertex grow to the same sum),
+/// with a corrective its columns, entries of maps, and the channels that nothing else drives.
+/// In: joints       [joints] whether each stays; with a joint its ancestors
+///     correctives  [correctives] whether each stays; none that a network, a pose or a setup reads
+///                  may go, and with one go those that it is a factor of
+/// Fails: kInvalidLength, kInvalidArgument (a joint without its parent, a corrective that is read),
+///        kInvalidIndex, and as validate.
+core::Result<Dna> keep_parts(const Dna& dna, const std::vector<bool>& joints,
+                             const std::vector<bool>& correctives);
+
 namespace detail {
 
 struct LodPlan {

@@ -1336,6 +1336,11 @@ def regroup(
 ) -> tuple[Dna, RegroupReport]:
     """(Dna, RegroupReport): see risorius.rigs.edit.regroup."""
 
+def keep_parts(dna: Dna, *, joints: Sequence[bool], correctives: Sequence[bool]) -> Dna:
+    """A copy with the joints and correctives alone that are True; every index counts in what is
+    left.
+    """
+
 class LayerCurves:
     """The curves of a layer, made ready for a list of controls."""
 

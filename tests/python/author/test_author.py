@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Joint rigs from expressions: what the written file does, by a reader of its own, and refusals."""
 
+import copy
 import importlib.util
 import itertools
 import json
@@ -23,8 +24,17 @@ from risorius.author import (
     pivots,
 )
 from risorius.author.fitting import bounded
-from risorius.author.geometry.simplify import attributes_of, fewer_triangles, simplified
+from risorius.author.geometry.polygon_mesh import polygon_mesh
+from risorius.author.geometry.simplify import (
+    attributes_of,
+    fan_triangles,
+    fewer_triangles,
+    pieces_of,
+    simplified,
+)
 from risorius.author.input import matching, shape_face, spec
+from risorius.author.level_meshes import level_meshes, shape_of
+from risorius.author.work import begin
 from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
@@ -36,12 +46,14 @@ oracle = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(oracle)
 
 METRES = 0.01
+EIGHT = [506, 304, 182, 109, 66, 39, 24, 24]
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("egg")
-    face_shapes.write_all(folder)
+    # Budgets that are given are kept; without them a face of 506 vertices has fewer levels.
+    face_shapes.write_all(folder, more=f"[lods]\nvertices = {EIGHT}\n")
     return folder
 
 
@@ -146,6 +158,93 @@ def test_eight_levels_by_another_reader(read, made):
         assert max(far) < (0.5 if lod < 4 else 0.7)  # cm, of motions up to 3
 
 
+def test_levels_end_before_the_picture_breaks(folder, tmp_path):
+    """A small face has fewer levels, whose skin stays near the fine one and folds nowhere."""
+    text = (folder / "spec.toml").read_text(encoding="utf-8")
+    for name in ("neutral.obj", "shapes"):
+        text = text.replace(f'"{name}"', f'"{(folder / name).as_posix()}"')
+    spec = tmp_path / "few.toml"
+    spec.write_text(text.partition("[lods]")[0] + "rounds = 2\n", encoding="utf-8")
+    done = command_line.run("author", spec, "-o", tmp_path / "few.dna", text=True)
+    assert "note: LOD 4 would have " in done.stdout
+    assert ": there are 4 levels of 8\n" in done.stdout
+    dna = risorius.load(tmp_path / "few.dna")
+    assert dna.lod_count == 4
+    assert len(dna.meshes[-1].positions) > 90
+    for mesh in dna.meshes[1:]:
+        triangles = np.asarray(mesh.layout_positions, int)[fan_triangles(mesh)]
+        for name in ("rest", *face_shapes.expressions(face_shapes.head()[0])):
+            points = np.asarray(mesh.positions, float)
+            if name != "rest":
+                neutral, _ = face_shapes.head()
+                fine = np.linalg.norm(points[:, None] - neutral, axis=2).argmin(axis=1)
+                points = points + face_shapes.expressions(neutral)[name][fine]
+            slivers, folds = shape_of(points, triangles)
+            assert slivers <= 0.02
+            assert folds <= 0.045
+
+
+def test_hair_of_more_vertices_than_the_skin_ends_no_level():
+    """A head whose hair is a mesh of cards: the levels are those of the head alone."""
+    positions, faces = face_shapes.head()
+    moved = face_shapes.expressions(positions)
+    shapes = shape_face.ShapeSet(
+        "egg", shape_face.ObjMesh(positions, np.zeros((0, 2)), faces.tolist()), moved
+    )
+    alone = shape_face.make_shape_face(shapes, {name: [name] for name in moved})
+    hairy = copy.copy(alone)
+    card = np.array([[0, 0, 0], [0, -4, 0], [0.4, -4, 0], [0.4, 0, 0]])
+    roots = np.stack([np.linspace(-8, 8, 300), np.full(300, 13.0), np.zeros(300)], axis=1)
+    points = (roots[:, None] + card).reshape(-1, 3)
+    quads = np.arange(1200).reshape(-1, 4).tolist()
+    hair = polygon_mesh(points, points, quads, points[:, :2], quads)
+    hair.skin_offsets, hair.skin_weights = np.arange(1201), np.ones(1200)
+    hair.skin_joint_indices, hair.maximum_influence_per_vertex = np.ones(1200, int), 1
+    hairy.meshes = [*alone.meshes, hair]
+    hairy.mesh_names = [*alone.mesh_names, "hair_lod0_mesh"]
+    hairy.lod_mesh_mapping = [[0, 1]]
+    plans = []
+    for dna in (alone, hairy):
+        work = begin(dna)
+        plans.append(level_meshes(work, work.wanted, LodOptions(), 8))
+    assert plans[0].count == plans[1].count == 4
+    assert plans[0].ended == plans[1].ended
+    for lod, share in ((1, 0.6), (2, 0.36), (3, 0.216)):
+        cards = len(plans[1].triangles[lod, 1]) / 2
+        assert cards == int(cards)  # each is whole
+        assert share * 300 < cards < share**0.5 * 300
+
+
+def test_pieces_of_a_mesh_stay_whole_or_go_together():
+    """Two eyes and forty lashes in the mesh of a head: no eye is lost, and all lashes or none."""
+    positions, faces = face_shapes.head()
+    eye = np.array([[x, y, z] for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], float)
+    box = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2],
+                    [1, 3, 7, 5]])  # fmt: skip
+    middles = [(3.0, 3.0, 12.0, 1.2), (-3.0, 3.0, 12.0, 1.2)]
+    middles += [(0.3 * i - 6, 5.0, 12.0, 0.05) for i in range(40)]
+    points, quads = [positions], [faces]
+    for x, y, z, size in middles:
+        quads.append(box + sum(map(len, points)))
+        points.append(eye * size + [x, y, z])
+    whole, corners = np.concatenate(points), np.concatenate(quads).tolist()
+    mesh = polygon_mesh(whole, whole, corners, whole[:, :2], corners)
+    pieces = pieces_of(mesh)
+    assert pieces.max() == 42
+    head, eyes = pieces[0], {int(pieces[506]), int(pieces[514])}
+    assert (pieces[:506] == head).all()
+    attributes = attributes_of(mesh, np.zeros((0, len(pieces), 3)))
+    seen = set()
+    for budget in (700, 500, 250, 120, 60):
+        triangles = fewer_triangles(mesh, attributes, budget)
+        there = set(pieces[np.asarray(mesh.layout_positions, int)[triangles]].ravel().tolist())
+        assert {int(head), *eyes} <= there
+        lashes = len(there) - 3
+        assert lashes in (0, 40)
+        seen.add(lashes)
+    assert seen == {0, 40}
+
+
 def test_a_coarser_level_keeps_the_rim_and_is_no_fold(read):
     """The face is open: its rim is still the rim, and no triangle looks the other way."""
     positions, _ = face_shapes.head()
@@ -174,6 +273,7 @@ def test_budgets_are_kept(folder, tmp_path):
     text = (folder / "spec.toml").read_text(encoding="utf-8")
     for name in ("neutral.obj", "shapes"):
         text = text.replace(f'"{name}"', json.dumps((folder / name).as_posix()))
+    text = text.partition("[lods]")[0]
     path.write_text(text + "[lods]\njoints = [40, 11, 3]\nvertices = [506, 120, 40]\n")
     out = tmp_path / "budgets.dna"
     done = command_line.run("author", path, "-o", out, "--joints-only", "--json", text=True)

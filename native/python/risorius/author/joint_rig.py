@@ -19,6 +19,7 @@ from .combinations import Combination, Combinations
 from .fitting import FitOptions, Progress, fit_joints
 from .geometry import skeleton as sk
 from .geometry.skeleton import Doubles
+from .level_meshes import LevelMeshes, level_meshes
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
 from .meshes import Made, count_deltas
 from .naming import joint_names
@@ -60,6 +61,7 @@ class JointRig:
     columns: list[int]  # the input of each expression
     combinations: list[Combination]  # correctives
     reference: Reference  # what other people's faces take over
+    ended: str = ""  # why there are fewer levels than asked for
 
 
 def make_joint_rig(
@@ -101,6 +103,7 @@ def make_joint_rig(
         work.columns,
         combinations,
         reference_of(work, fit, made),
+        made.coarse.ended,
     )
 
 
@@ -143,7 +146,6 @@ def _made(
     """Joints, what they do, and the meshes of all levels; whole: with shapes and errors."""
     o.lods.check()
     work = begin(dna)
-    work.levels = _level_count(dna, o.lods)
     wanted, work.wanted = work.wanted, {}  # which are large: not kept longer than they are needed
     needs = {m for m in wanted if needs_joints(work, dna.meshes[m], wanted[m])}
     needs = {m for m in needs if not any(word in dna.mesh_names[m] for word in o.kept)}
@@ -153,6 +155,10 @@ def _made(
         raise ArgumentError("no mesh of LOD 0 has a blend shape that an expression moves")
     shaped = [m for m in listed_meshes(dna, 0) if m in needs]
     unit = MM.get(dna.translation_unit, 10.0)
+    coarse = LevelMeshes(_level_count(dna, o.lods))
+    if like is None:
+        coarse = level_meshes(work, wanted, o.lods, coarse.count)
+    work.levels = coarse.count
     o = replace(o, fit=replace(o.fit, least_effect=o.least_effect_mm / unit))
     if like is None:
         # The fit is nearly all of the work; levels and weights take what is left of the bar.
@@ -168,7 +174,7 @@ def _made(
     names = like.names if like else _names(work, fit, effects, _places(work, shaped, fit, held))
     regions = _add_joints(work, fit, names)
     _add_behavior(work, beside, effects, regions, o)
-    made = Made(work, o, weights, like, whole=whole)
+    made = Made(work, o, weights, coarse, like, whole=whole)
     for lod in range(work.levels):
         made.add_level(lod, wanted, needs)
         if progress is not None and progress(0.7 + 0.1 * (lod + 1) / work.levels) is False:

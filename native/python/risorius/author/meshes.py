@@ -12,10 +12,11 @@ import numpy as np
 from .. import BlendShapeTarget, Dna, Mesh
 from .between import Between, Ways
 from .geometry import skeleton as sk
-from .geometry.simplify import Floats, attributes_of, fewer_triangles, simplified
+from .geometry.simplify import simplified
 from .geometry.skeleton import Doubles, Ints
+from .level_meshes import LevelMeshes
 from .level_weights import level_weights
-from .levels import level_name, mesh_budget, vertex_budgets
+from .levels import level_name
 from .reference import Reference
 from .work import (
     MM,
@@ -41,6 +42,7 @@ class Made:
         work: Work,
         options: RigOptions,
         weights: dict[int, Doubles],
+        coarse: LevelMeshes,
         like: Reference | None = None,
         *,
         whole: bool = True,
@@ -51,24 +53,20 @@ class Made:
             work: the face, its joints made.
             options: what is to be made.
             weights: float64[V, joints] of the finest meshes.
+            coarse: triangles of the levels that are made.
             like: what is taken over.
             whole: with blend shapes and errors, else with weights alone.
         """
         self.whole = whole
         self.work, self.options, self.weights, self.like = work, options, weights, like
-        self._attributes: dict[str, Floats] = {}  # of fine meshes, which all levels look at
+        self.coarse = coarse
         self.triangles: dict[str, Ints] = {}  # of the coarse meshes, in layouts of the fine ones
         self.ways = Ways(work)
         self.meshes: list[Mesh] = []
         self.names: list[str] = []
         self.listed: list[list[int]] = []
         self.errors: list[MeshErrors] = []
-        own = [
-            sum(len(work.source.meshes[m].positions) for m in listed_meshes(work.source, lod))
-            for lod in range(max(1, work.source.lod_count))
-        ]
-        self.budgets = vertex_budgets(options.lods, work.levels, own)
-        self.own = len(own)
+        self.own = max(1, work.source.lod_count)
         self._numbers: dict[int, int] = {}  # a mesh of the source may be at several levels
 
     def add_level(self, lod: int, wanted: dict[int, Doubles], needs: set[int]) -> None:
@@ -93,10 +91,9 @@ class Made:
                 finest = m if m in self.weights else None
                 self._add(lod, mesh, source.mesh_names[m], wanted[m], start, finest)
             return
-        share = self.budgets[lod] / max(1, self.budgets[0])
         for m in listed_meshes(source, 0):
             mesh, name = source.meshes[m], source.mesh_names[m]
-            triangles = self._triangles(lod, name, mesh, wanted[m], share)
+            triangles = self._triangles(lod, m, name)
             if not len(triangles):
                 continue
             coarse, kept = simplified(mesh, triangles)
@@ -106,17 +103,12 @@ class Made:
             start = self.weights[m][kept] if m in needs else None
             self._add(lod, coarse, name, wanted[m][:, kept], start)
 
-    def _triangles(self, lod: int, name: str, mesh: Mesh, wanted: Doubles, share: float) -> Ints:
+    def _triangles(self, lod: int, m: int, name: str) -> Ints:
         """int64[n, 3]: what a coarse mesh keeps of the fine one's layouts; none: it is left out."""
         none = np.zeros((0, 3), np.int64)
         if self.like is not None:
             return self.like.triangles.get(level_name(name, lod), none)
-        budget = mesh_budget(name, len(mesh.positions), share)
-        if not budget:
-            return none
-        if name not in self._attributes:
-            self._attributes[name] = attributes_of(mesh, wanted)
-        return fewer_triangles(mesh, self._attributes[name], budget)
+        return self.coarse.triangles.get((lod, m), none)
 
     def _start(self, mesh: Mesh) -> Doubles:
         """Dense weights of the nearest vertices of the finest level."""

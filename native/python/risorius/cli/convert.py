@@ -21,6 +21,7 @@ from .files import (
     InputError,
     kind_of,
     label,
+    parse_lods,
     read,
     refuse_same_file,
     require_writable,
@@ -84,22 +85,6 @@ def _add_system(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--winding", choices=("ccw", "cw"), help="of the faces")
     group.add_argument("--translation-unit", choices=("cm", "m"))
     group.add_argument("--rotation-unit", choices=("degrees", "radians"))
-
-
-def parse_lods(text: str) -> list[int]:
-    """LOD numbers from a text such as "0", "0-2" or "0,3,5".
-
-    Raises:
-        CommandLineError: a text of another form.
-    """
-    lods: set[int] = set()
-    for part in text.split(","):
-        match = re.fullmatch(r"\s*(\d{1,5})(?:-(\d{1,5}))?\s*", part, re.ASCII)
-        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
-        if not first <= last <= 0xFFFF:
-            raise CommandLineError(f"--lods: 0 or 0-2 or 0,3,5 was expected, found {text!r}")
-        lods.update(range(first, last + 1))
-    return sorted(lods)
 
 
 def complain(args: argparse.Namespace) -> None:

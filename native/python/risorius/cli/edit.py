@@ -1,20 +1,27 @@
 # SPDX-License-Identifier: MIT
-"""risorius edit: a DNA file made into another one. regroup: its joint groups made anew."""
+"""risorius edit: a DNA file made into another one. regroup: its joint groups made anew. lighten:
+fewer joints, correctives and levels of detail."""
 
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import json
 import math
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import risorius
 
 from ..base import toml
+from ..base.budget import BudgetError
+from ..base.errors import ArgumentError
 from ..base.reading import TEXT
 from ..base.words import counted
+from ..lightening import LightenReport, lighten
 from ..rigs import edit
 from .convert import json_text, version_of, warnings_as_lines, write
 from .files import (
@@ -23,9 +30,11 @@ from .files import (
     kind_of,
     label,
     number,
+    parse_lods,
     read,
     read_bytes,
     refuse_same_file,
+    require_suffix,
     require_writable,
     summary,
     whole_number,
@@ -45,11 +54,21 @@ _CHANGES = {
     "position_mm": ("a joint in the face", "mm"),
 }
 _PLOTS = (".png", ".svg")
+_LIGHTEN = """\
+A finished face with fewer joints, correctives and levels of detail, on which the animation of the
+first plays on: controls keep their names and numbers, joints that stay keep theirs and their
+motions. Joints leave that others can stand for; weights are fitted anew over all expressions.
+Correctives leave that move vertices least. Prints sizes, the time of an evaluation, and how far
+each expression is off; --report writes all expressions. See docs/authoring.md."""
+_REPORTS = (".json", ".csv")
+_WORST = 20  # expressions that are printed
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     edits = subparsers.add_parser("edit", help="make a DNA file into another one")
-    _add_regroup(edits.add_subparsers(dest="kind", required=True))
+    kinds = edits.add_subparsers(dest="kind", required=True)
+    _add_regroup(kinds)
+    _add_lighten(kinds)
 
 
 def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -95,6 +114,33 @@ def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
     parser.add_argument("--json", action="store_true", help="the report for a program")
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
     parser.set_defaults(func=run)
+
+
+def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "lighten", help="fewer joints, correctives and levels", description=_LIGHTEN
+    )
+    parser.add_argument("input", metavar="INPUT")
+    parser.add_argument("-o", "--output", required=True, metavar="OUTPUT", help=".dna or .json")
+    parser.add_argument("--joints", type=whole_number(1, 65_535), metavar="N", help="N in all")
+    parser.add_argument("--correctives", type=whole_number(0, 65_535), metavar="N", help="N in all")
+    parser.add_argument("--lods", metavar="LODS", help="only these, e.g. 0 or 0-2 or 0,2,4")
+    parser.add_argument(
+        "--keep", metavar="NAMES", default="", help="joints that stay as well, apart by commas"
+    )
+    parser.add_argument(
+        "--shapes",
+        type=number(0.0, 1000.0),
+        metavar="MM",
+        help="blend shapes hold what vertices are further off than this (default: they hold "
+        "nothing new)",
+    )
+    parser.add_argument(
+        "--report", metavar="FILE", help="the error of each expression: .json or .csv"
+    )
+    parser.add_argument("--json", action="store_true", help="all of it for a program")
+    parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
+    parser.set_defaults(func=run_lighten)
 
 
 def parse_threshold(text: str) -> float | list[float]:
@@ -266,3 +312,101 @@ def run(args: argparse.Namespace) -> int:
               file=out)  # fmt: skip
     print(json.dumps(facts, indent=2) if args.json else page(facts), file=out)
     return 0
+
+
+def run_lighten(args: argparse.Namespace) -> int:
+    if args.joints is None and args.correctives is None and args.lods is None:
+        raise CommandLineError("edit lighten: --joints, --correctives or --lods was expected")
+    if not args.force:
+        refuse_same_file(args.input, args.output, "--force replaces it")
+    if args.report is not None:
+        require_suffix(Path(args.report), _REPORTS, "--report")
+        if Path(args.report).resolve() == Path(args.output).resolve():
+            raise CommandLineError("--report: another file than OUTPUT was expected")
+    lods = None if args.lods is None else parse_lods(args.lods)
+    require_writable(args.output, args.report)
+    kinds = [
+        kind_of(name, "dna" if name == "-" else None, "-") for name in (args.input, args.output)
+    ]
+    source = read(args.input, kinds[0])
+    try:
+        dna, report = lighten(
+            source,
+            joints=args.joints,
+            correctives=args.correctives,
+            lods=lods,
+            keep=[name for name in args.keep.split(",") if name],
+            shapes_mm=args.shapes,
+        )
+    except (ArgumentError, BudgetError) as error:
+        raise InputError(f"{label(args.input)}: {error}") from error
+    with warnings_as_lines(label(args.input)):
+        data = dna.to_bytes(version=version_of(source, dna, False))
+    write(args.output, json_text(dna, None) if kinds[1] == "json" else data)
+    if args.report is not None:
+        write(args.report, report_file(report, args.report))
+    out = sys.stderr if args.output == "-" else sys.stdout
+    if args.json:
+        print(json.dumps(asdict(report), indent=2), file=out)
+    else:
+        print(f"{label(args.output, '<stdout>')}: {summary(dna)}\n", file=out)
+        print("\n".join(lighten_lines(report)), file=out)
+    return 0
+
+
+def report_file(report: LightenReport, name: str) -> bytes:
+    """All expressions as a file.
+
+    Args:
+        report: of lighten.
+        name: of the file: .csv has a row for each expression, .json all else too.
+    """
+    if not name.lower().endswith(".csv"):
+        return (json.dumps(asdict(report), indent=2) + "\n").encode()
+    text = io.StringIO()
+    rows = [asdict(expression) for expression in report.expressions]
+    table = csv.DictWriter(
+        text, ["name", "largest_mm", "rms_mm", "lod", "corrective"], lineterminator="\n"
+    )
+    table.writeheader()
+    table.writerows(rows)
+    return text.getvalue().encode()
+
+
+def lighten_lines(report: LightenReport) -> list[str]:
+    """The report for a person: sizes, and the expressions that are furthest off."""
+    titles = {
+        "joints": "joints", "correctives": "correctives", "levels": "levels of detail",
+        "meshes": "meshes", "channels": "blend shape channels", "deltas": "deltas",
+        "coefficients": "joint coefficients", "file_bytes": "bytes",
+    }  # fmt: skip
+    before, after = asdict(report.before), asdict(report.after)
+    out = [f"{'':<22}{'before':>14}{'after':>14}"]
+    out += [f"{title:<22}{before[key]:>14,}{after[key]:>14,}" for key, title in titles.items()]
+    key = "microseconds"
+    out.append(f"{'evaluation, us':<22}{before[key]:>14.1f}{after[key]:>14.1f}")
+    out.append("")
+    rows = report.expressions
+    kinds = {"": "controls", "kept": "correctives that stay", "removed": "correctives taken out"}
+    for kind, title in kinds.items():
+        sizes = sorted(row.largest_mm for row in rows if row.corrective == kind)
+        if sizes:
+            out.append(
+                f"{len(sizes):,} {title}: off by {sizes[-1]:.2f} mm at most, "
+                f"{sizes[len(sizes) // 2]:.2f} in the median"
+            )
+    worst = [row for row in rows[:_WORST] if row.largest_mm >= 0.005]
+    if worst:
+        out.append(f"\n{'largest mm':>10} {'RMS mm':>7} {'LOD':>4}  expression")
+    for row in worst:
+        note = f" ({row.corrective})" if row.corrective else ""
+        out.append(
+            f"{row.largest_mm:10.2f} {row.rms_mm:7.3f} {row.lod:4}  {_short(row.name)}{note}"
+        )
+    return out
+
+
+def _short(name: str) -> str:
+    """Names of controls without their prefix, a corrective of many as its first four."""
+    parts = [part.rpartition(".")[2] for part in name.split(" + ")]
+    return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

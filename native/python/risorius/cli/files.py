@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -75,6 +76,22 @@ def number(
             raise argparse.ArgumentTypeError(str(error)) from None
 
     return read
+
+
+def parse_lods(text: str) -> list[int]:
+    """LOD numbers from a text such as "0", "0-2" or "0,3,5".
+
+    Raises:
+        CommandLineError: a text of another form.
+    """
+    lods: set[int] = set()
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d{1,5})(?:-(\d{1,5}))?\s*", part, re.ASCII)
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (1, 0)
+        if not first <= last <= 0xFFFF:
+            raise CommandLineError(f"--lods: 0 or 0-2 or 0,3,5 was expected, found {text!r}")
+        lods.update(range(first, last + 1))
+    return sorted(lods)
 
 
 def label(name: str, standard: str = "<stdin>") -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,11 @@ _MOTION = 2.0  # of the mesh' size, moved otherwise than the neighbours, counts 
 _COMPONENTS = 6  # of the motion that are looked at
 _TRIES = 4
 _STUCK = 1.5  # times the vertices that were asked for: seams are given up
+# Pieces of a mesh (eyes, teeth, lashes) stay whole: each keeps so many vertices. Pieces that are
+# smaller than a share of the mesh all go at once when less would be left of them.
+_LEAST_OF_PIECE, _SMALL_PIECE, _GONE = 8, 0.06, 3.0
+_CARD, _MANY = 16, 60  # vertices of a card of hair at most, and how many make hair
+_THINNED = 0.6  # the power of its share: a head goes bald sooner than it goes flat
 
 Floats = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.uint32]
@@ -58,29 +64,100 @@ def _size(mesh: Mesh) -> float:
     return float(np.ptp(np.asarray(mesh.positions, np.float64), axis=0).max()) or 1.0
 
 
+def pieces_of(mesh: Mesh) -> Ints:
+    """int64[V]: the number of the piece that a vertex belongs to; seams of the texture cut
+    nothing.
+
+    Args:
+        mesh: stays as it is.
+    """
+    count = len(mesh.positions)
+    _, own = np.unique(np.asarray(mesh.positions), axis=0, return_inverse=True)
+    corners = own.ravel()[np.asarray(mesh.layout_positions, np.int64)[fan_triangles(mesh)]]
+    label = np.arange(count)
+    while True:
+        least = label.copy()
+        lowest = label[corners].min(axis=1) if len(corners) else np.zeros(0, np.int64)
+        for k in range(3):
+            np.minimum.at(least, corners[:, k], lowest)
+        least = least[least]
+        if (least == label).all():
+            break
+        label = least
+    return np.asarray(np.unique(label[own.ravel()], return_inverse=True)[1].ravel(), np.int64)
+
+
 def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:
     """int64[n, 3]: triangles of a mesh' layouts with about so many vertices, some of those it has.
 
     What the texture and the expressions do is kept beside the form. Borders and seams stay where
     they are; where there are so many seams that nothing can be taken away, each vertex keeps one
-    place of the texture. A mesh of many pieces may keep more vertices than were asked for.
+    place of the texture. Pieces are kept whole: each has some vertices left, or small ones all go.
 
     Args:
         mesh: stays as it is.
         attributes: float32[layouts, n] of it, see attributes_of.
         vertices: at most, where it can be.
     """
-    positions = np.asarray(mesh.positions, np.float64)
-    places = np.asarray(mesh.layout_positions, np.int64)
-    points = positions[places].astype(np.float32)
     triangles = fan_triangles(mesh).astype(np.uint32)
+    places = np.asarray(mesh.layout_positions, np.int64)
+    if not len(triangles):
+        return np.asarray(triangles, np.int64)
+    pieces = pieces_of(mesh)[places[triangles[:, 0]]]
+    order = np.argsort(pieces, kind="stable")
+    parts = np.split(triangles[order], np.flatnonzero(np.diff(pieces[order])) + 1)
+    held = [np.unique(places[part]) for part in parts]
+    out = [
+        np.asarray(part, np.int64)
+        if budget >= len(own)
+        else _fewer_whole(mesh, attributes, part, budget)
+        for part, own, budget in zip(parts, held, _budgets(mesh, held, vertices), strict=True)
+        if budget
+    ]
+    return np.concatenate([np.zeros((0, 3), np.int64), *out])
+
+
+def _budgets(mesh: Mesh, held: Sequence[Ints], vertices: int) -> list[int]:
+    """Vertices of each piece, of which `held` are those that it has; 0: it is left out."""
+    if len(held) == 1:
+        return [vertices]
+    positions, size = np.asarray(mesh.positions, np.float64), _size(mesh)
+    counts = np.array([len(own) for own in held])
+    share = vertices / max(1, int(counts.sum()))
+    cards = np.flatnonzero(counts <= _CARD)
+    if len(cards) < _MANY:
+        cards = cards[:0]
+    extents = np.array([np.ptp(positions[own], axis=0).max() for own in held])
+    small = extents < _SMALL_PIECE * size
+    small[cards] = False
+    out = np.maximum(np.minimum(counts, _LEAST_OF_PIECE), np.round(share * counts))
+    if share * counts[small].sum() < _GONE * small.sum():
+        out[small] = 0
+    # Of hair fewer cards stay, whole and evenly, which thins it.
+    among = min(len(cards), round(share**_THINNED * len(cards)))
+    out[cards] = 0
+    stay = cards[np.arange(among) * len(cards) // max(1, among)]
+    out[stay] = counts[stay]
+    return [int(n) for n in out]
+
+
+def _fewer_whole(mesh: Mesh, attributes: Floats, triangles: Indices, vertices: int) -> Ints:
+    """int64[n, 3]: one piece with fewer triangles."""
+    used, own = np.unique(triangles, return_inverse=True)
+    triangles = own.reshape(-1, 3).astype(np.uint32)
+    places = np.asarray(mesh.layout_positions, np.int64)[used]
+    points = np.asarray(mesh.positions, np.float64)[places]
+    # An attribute counts beside the size of what is simplified, which is the piece alone.
+    share = float(np.ptp(points, axis=0).max()) / _size(mesh)
+    attributes = attributes[used] / np.float32(max(share, 1e-6))
+    points = points.astype(np.float32)
     found = _fewer(points, attributes, triangles, places, vertices)
     if len(np.unique(places[found])) > _STUCK * vertices:
         _, first, of = np.unique(places, return_index=True, return_inverse=True)
         welded = of.ravel()[triangles].astype(np.uint32)
         found = _fewer(points[first], attributes[first, 2:], welded, places[first], vertices)
         found = np.asarray(first, np.uint32)[found]
-    return np.asarray(found, np.int64)
+    return np.asarray(used[found], np.int64)
 
 
 def _fewer(

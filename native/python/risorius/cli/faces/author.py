@@ -286,6 +286,8 @@ def as_lines(rig: JointRig, path: Path) -> list[str]:
         out.append(
             f"{lod:3} {x.joints:7,} {x.vertices:9,} {x.deltas:9,} {x.rms:8.4f} {x.largest:11.3f}"
         )
+    if rig.ended:
+        out.append(f"note: {rig.ended}")
     title = f"{'mesh':26} {'RMS mm':>8} {'% height':>9} {'largest mm':>11}  expression"
     out.append(title)
     for m in rig.errors:

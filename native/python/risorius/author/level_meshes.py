@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""The triangles of coarser levels of detail, and where they end: before the picture breaks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .. import Mesh, _native
+from .geometry.simplify import Floats, attributes_of, fan_triangles, fewer_triangles, pieces_of
+from .geometry.skeleton import Doubles, Ints
+from .levels import LodOptions, mesh_budget, vertex_budgets
+from .work import Work, listed_meshes
+
+_POSES = 6  # the expressions that move most, looked at beside the face that rests
+_LOOKED_AT = 2000  # vertices of the fine skin
+# What a level may have: distances are shares of the skin's size.
+_RMS, _FARTHEST = 0.005, 0.015
+_SLIVERS, _LONG = 0.02, 30.0  # triangles that are so many times as long as high
+_FOLDS, _FOLDED = 0.03, -0.5  # edges, and the cosine of 120 degrees
+
+
+@dataclass
+class LevelMeshes:
+    """Triangles of each level that is made, in layouts of the fine meshes.
+
+    Attributes:
+        count: levels, those of the source too.
+        triangles: by level and mesh of the source; a mesh that is not there is left out.
+        ended: why there are no more, or "".
+    """
+
+    count: int
+    triangles: dict[tuple[int, int], Ints] = field(default_factory=dict)
+    ended: str = ""
+
+
+def level_meshes(
+    work: Work, wanted: Mapping[int, Doubles], options: LodOptions, levels: int
+) -> LevelMeshes:
+    """Coarser meshes of the finest level's, level after level.
+
+    Where no numbers of vertices were given, the levels end before one on whose skin triangles are
+    slivers, neighbours fold over 120 degrees or the surface leaves the fine one, at rest or in the
+    expressions that move most.
+
+    Args:
+        work: the face.
+        wanted: float64[E, V, 3] of each mesh of the source, what it is to do.
+        options: the budgets.
+        levels: how many there are to be at most.
+    """
+    source = work.source
+    had = max(1, source.lod_count)
+    own = [sum(len(source.meshes[m].positions) for m in listed_meshes(source, lod))
+           for lod in range(had)]  # fmt: skip
+    budgets = vertex_budgets(options, levels, own)
+    fine = listed_meshes(source, 0)
+    # Hair may have more vertices than the skin; nothing has more to do.
+    skin = max(fine, key=lambda m: float(np.vdot(wanted[m], wanted[m])))
+    out, check = LevelMeshes(min(levels, had)), _Skin(source.meshes[skin], wanted[skin])
+    attributes: dict[int, Floats] = {}
+    for lod in range(had, levels):
+        made: dict[tuple[int, int], Ints] = {}
+        for m in fine:
+            mesh = source.meshes[m]
+            share = budgets[lod] / max(1, budgets[0])
+            budget = mesh_budget(source.mesh_names[m], len(mesh.positions), share)
+            if not budget:
+                continue
+            if m not in attributes:
+                attributes[m] = attributes_of(mesh, wanted[m])
+            triangles = fewer_triangles(mesh, attributes[m], budget)
+            if len(triangles):
+                made[lod, m] = triangles
+        wrong = "" if options.vertices else check.wrong(made.get((lod, skin)))
+        if wrong:
+            out.ended = f"LOD {lod} would have {wrong}: there are {lod} levels of {levels}"
+            break
+        out.triangles |= made
+        out.count = lod + 1
+    return out
+
+
+class _Skin:
+    """The mesh that moves most: its largest piece, at rest and in some expressions."""
+
+    def __init__(self, mesh: Mesh, wanted: Doubles) -> None:
+        self.positions = np.asarray(mesh.positions, np.float64)
+        self.places = np.asarray(mesh.layout_positions, np.int64)
+        self.pieces = pieces_of(mesh)
+        largest = int(np.bincount(self.pieces).argmax()) if len(self.pieces) else 0
+        self.mine = self.pieces == largest
+        held = np.flatnonzero(self.mine)
+        self.looked_at = held[:: max(1, len(held) // _LOOKED_AT)]
+        self.size = float(np.ptp(self.positions[held], axis=0).max()) if len(held) else 1.0
+        most = np.argsort(-(wanted**2).sum(axis=(1, 2)), kind="stable")[:_POSES]
+        self.poses = [self.positions, *(self.positions + wanted[e] for e in most)]
+        fine = self.places[fan_triangles(mesh)]
+        self.fine = fine[self.mine[fine[:, 0]]] if len(fine) else fine
+        # A mesh may have slivers and folds of its own, as rims of lids have.
+        self.had = [shape_of(points, self.fine) for points in self.poses]
+
+    def wrong(self, triangles: Ints | None) -> str:
+        """What is wrong with a level's skin; "" where nothing is.
+
+        Args:
+            triangles: int64[n, 3] in layouts, None: it was left out.
+        """
+        if triangles is None:
+            return "no skin"
+        corners = self.places[triangles]
+        corners = corners[self.mine[corners[:, 0]]]
+        used, local = np.unique(corners, return_inverse=True)
+        if len(used) < 4:
+            return "no skin"
+        for points, (had_slivers, had_folds) in zip(self.poses, self.had, strict=True):
+            slivers, folds = shape_of(points, corners)
+            if slivers > max(_SLIVERS, had_slivers):
+                return f"{slivers:.1%} slivers"
+            if folds > max(_FOLDS, had_folds):
+                return f"{folds:.1%} of its edges folded over 120 degrees"
+        starts = 3 * np.arange(len(corners) + 1, dtype=np.uint32)
+        faces = local.ravel().astype(np.uint32)
+        checker = _native.SkinChecker(self.positions[used], starts, faces, [], 1.0)
+        found = checker.nearest(self.positions[self.looked_at], np.zeros((0, 3)))
+        away = found[2] / self.size
+        if np.sqrt((away**2).mean()) > _RMS or away.max() > _FARTHEST:
+            return f"skin that is {away.max():.1%} of its size away"
+        return ""
+
+
+def shape_of(points: Doubles, triangles: Ints) -> tuple[float, float]:
+    """Shares of triangles that are slivers, and of edges whose two sides fold over 120 degrees.
+
+    Args:
+        points: float64[V, 3].
+        triangles: int64[n, 3].
+    """
+    if not len(triangles):
+        return 0.0, 0.0
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    twice = np.linalg.norm(normals, axis=1)
+    longest = np.max([np.linalg.norm(s, axis=1) for s in (b - a, c - b, a - c)], axis=0)
+    slivers = float((longest**2 > _LONG * twice).mean())
+    normals = normals / np.maximum(twice, 1e-30)[:, None]
+    pairs = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
+    faces = np.tile(np.arange(len(triangles)), 3)
+    _, edge, sides = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(edge.ravel(), kind="stable")
+    first = (np.cumsum(sides) - sides)[sides == 2]
+    dots = (normals[faces[order][first]] * normals[faces[order][first + 1]]).sum(axis=1)
+    return slivers, float((dots < _FOLDED).sum() / len(sides))

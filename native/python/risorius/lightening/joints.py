@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: MIT
+"""Which joints a face can do without: again and again the one whose vertices others move most
+alike."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from .. import Dna, Mesh
+from ..author.geometry import skeleton as sk
+from ..author.geometry.skeleton import Doubles, Ints
+from ..base.errors import ArgumentError
+from ..base.words import counted
+from ..rigs.joint_controls import joint_controls
+from .simplex import shares
+
+_HEIRS = 5  # joints that may take over what one did
+# Joints that people and programs turn, look for or fasten things to.
+_NEEDED = re.compile(
+    r"root|pelvis|hips|spine.*|neck.*|head|facial_c_(facialroot|jaw|neck.*root)|jaw"
+    r"|facial_[lr]_eye|(eye_?[lr]|[lr]_?eye)"
+)
+
+
+def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
+    """Joints that cannot leave: neck, head, jaw, eyes and root by their names, those whose rotation
+    controls hold, those that networks, twists and swings move, and all that these hang on.
+
+    Args:
+        dna: the face.
+        asked: names of others.
+
+    Raises:
+        ArgumentError: a name that no joint has.
+    """
+    names = dna.joint_names
+    for name in asked:
+        if name not in names:
+            raise ArgumentError(f"keep: there is no joint {name!r}")
+    parents = np.asarray(dna.joint_parents, np.int64)
+    known = [name.lower().replace(".", "_") for name in names]
+    found = {j for j, name in enumerate(known) if _NEEDED.fullmatch(name)}
+    found |= {j for j, name in enumerate(names) if name in asked or parents[j] == j}
+    found |= {control.joint for control in joint_controls(dna)[0]}
+    setup = dna.twist_swing_behavior
+    found |= {int(j) for part in (*setup.twists, *setup.swings) for j in part.output_joint_indices}
+    moved = dna.machine_learned_behavior_ext.joints
+    keys = zip(moved.parameter_keys, moved.parameter_values, strict=False)
+    stride = 10 if (1, 1) in {(int(k), int(v)) for k, v in keys} else 9
+    found |= {int(output) // stride for output in moved.output_indices}
+    above = found & set(range(len(parents)))
+    while above:
+        above = {int(parents[joint]) for joint in above} - found
+        found |= above
+    return sorted(found)
+
+
+def mirrored_joints(dna: Dna) -> Ints:
+    """int64[joints]: of each joint that of the other side by its place, else itself.
+
+    Args:
+        dna: the face.
+    """
+    rest = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
+    sides = [i for i, axis in enumerate(dna.coordinate_system) if axis in ("left", "right")]
+    turn = np.ones(3)
+    turn[sides[0] if sides else 0] = -1
+    near = 1e-3 * max(float(np.ptp(rest, axis=0).max(initial=0.0)), 1e-9)
+    out = np.arange(len(rest))
+    for joint, place in enumerate(rest):
+        apart = np.linalg.norm(rest - place * turn, axis=1)
+        other = int(apart.argmin())
+        if np.linalg.norm(place - place * turn) > near and apart[other] < near:
+            out[joint] = other
+    own = np.arange(len(out))
+    return np.asarray(np.where(out[out] == own, out, own))
+
+
+class Leaving:
+    """Joints that leave one after the other, each handing its vertices to those most like it."""
+
+    def __init__(
+        self,
+        products: Doubles,
+        points: Doubles,
+        held: list[tuple[Ints, Doubles]],
+        importance: Doubles,
+    ) -> None:
+        """Begins.
+
+        Args:
+            products: float64[J, 4, J, 4]: over all poses, what two joints add to a point.
+            points: float64[V, 4], vertices of all meshes, (p, 1).
+            held: of each joint its vertices and their weights.
+            importance: float64[V] of a vertex' squared error.
+        """
+        count = len(held)
+        self.products, self.points, self.held = products, points, list(held)
+        self.importance = importance
+        self.own = np.einsum("hrhs->hrs", products).copy()
+        self.there = np.ones(count, bool)
+        self.costs = np.full(count, np.inf)
+        self.heirs: list[tuple[Ints, Doubles]] = [(np.zeros(0, np.int64), np.zeros(0))] * count
+        self.near: list[Ints] = []
+
+    def choose(
+        self, leaving: int, fixed: Sequence[int], parents: Ints, pairs: Ints, levels: Doubles
+    ) -> list[int]:
+        """The joints that leave, the first first.
+
+        Args:
+            leaving: how many are to.
+            fixed: those that stay.
+            parents: int64[J]; a joint stays as long as another hangs on it.
+            pairs: int64[J], the joint of the other side.
+            levels: bool[J, levels], where a joint is listed: its heirs are listed there too.
+        """
+        self.levels = levels
+        can = np.ones(len(parents), bool)
+        can[list(fixed)] = False
+        children = np.bincount(parents, minlength=len(parents))
+        children -= np.bincount(parents[parents == np.arange(len(parents))], minlength=len(parents))
+        pairs = np.where(can & can[pairs], pairs, np.arange(len(pairs)))
+        for joint in np.flatnonzero(can):
+            self._price(int(joint))
+        out: list[int] = []
+        while len(out) < leaving:
+            free = can & self.there & (children == 0)
+            alone = pairs == np.arange(len(pairs))
+            score = np.where(alone, self.costs, self.costs + self.costs[pairs])
+            whole = free & (alone | free[pairs])
+            if leaving - len(out) == 1 and (whole & alone).any():
+                whole &= alone
+            score = np.where(whole if whole.any() else free, score, np.inf)
+            first = int(score.argmin())
+            for joint in sorted({first, int(pairs[first])})[: leaving - len(out)]:
+                self._leave(joint)
+                children[parents[joint]] -= 1
+                out.append(joint)
+            stale = [
+                j for j in np.flatnonzero(can & self.there).tolist()
+                if not self.there[self.heirs[j][0]].all()
+            ]  # fmt: skip
+            for joint in stale:
+                self._price(joint)
+        return out
+
+    def _price(self, joint: int) -> None:
+        """Squared error of a joint's vertices when the best mixture of others takes them."""
+        vertices, weights = self.held[joint]
+        rows = self.points[vertices]
+        spread = (rows * (self.importance[vertices] * weights**2)[:, None]).T @ rows
+        cross = np.einsum("hrs,rs->h", self.products[:, :, joint], spread)
+        own = np.einsum("hrs,rs->h", self.own, spread)
+        single = own - 2 * cross + own[joint]
+        may = self.there & (self.levels | ~self.levels[joint]).all(axis=1)
+        may[joint] = False
+        if not may.any():
+            may = self.there.copy()
+            may[joint] = False
+        heirs = np.flatnonzero(may)
+        heirs = heirs[np.argsort(single[heirs], kind="stable")[:_HEIRS]]
+        part = self.products[heirs][:, :, heirs]
+        gram = np.einsum("hrls,rs->hl", part, spread)
+        found = shares(gram[None], cross[None, heirs], len(heirs))[0]
+        cost = float(found @ gram @ found - 2 * found @ cross[heirs] + own[joint])
+        self.costs[joint] = max(cost, 0.0)
+        self.heirs[joint] = heirs[found > 0], found[found > 0]
+
+    def _leave(self, joint: int) -> None:
+        vertices, weights = self.held[joint]
+        heirs, parts = self.heirs[joint]
+        if not self.there[heirs].all():
+            self._price(joint)
+            heirs, parts = self.heirs[joint]
+        self.there[joint] = False
+        self.costs[joint] = np.inf
+        self.held[joint] = np.zeros(0, np.int64), np.zeros(0)
+        for heir, part in zip(heirs.tolist(), parts.tolist(), strict=True):
+            whole = np.concatenate([self.held[heir][0], vertices])
+            rows, of = np.unique(whole, return_inverse=True)
+            values = np.concatenate([self.held[heir][1], part * weights])
+            summed = np.bincount(of.ravel(), weights=values, minlength=len(rows))
+            self.held[heir] = np.asarray(rows, np.int64), summed.astype(np.float64)
+            if np.isfinite(self.costs[heir]):
+                self._price(heir)
+
+
+def require_count(dna: Dna, joints: int, needed: Sequence[int]) -> None:
+    """Refuse a number of joints that cannot be.
+
+    Args:
+        dna: the face.
+        joints: how many are asked for.
+        needed: those that must stay.
+
+    Raises:
+        ArgumentError: more joints than there are, or fewer than must stay.
+    """
+    there = len(dna.joint_names)
+    if joints > there:
+        raise ArgumentError(
+            f"joints: at most the {there:,} that the face has were expected, found {joints:,}"
+        )
+    if joints < len(needed):
+        names = [dna.joint_names[j] for j in needed]
+        some = ", ".join(names[:8]) + (" ..." if len(names) > 8 else "")
+        raise ArgumentError(
+            f"joints: at least {counted(len(needed), 'joint')} that must stay were expected "
+            f"({some}), found {joints:,}"
+        )
+
+
+def joint_table(dna: Dna) -> Doubles:
+    """bool[J, levels]: which joints each level lists; all where the file does not say.
+
+    Args:
+        dna: the face.
+    """
+    mapping = dna.lod_joint_mapping
+    out = np.ones((len(dna.joint_names), max(1, dna.lod_count)), bool)
+    for lod in range(min(len(mapping), out.shape[1])):
+        out[:, lod] = False
+        out[np.asarray(mapping[lod], np.int64), lod] = True
+    return out
+
+
+def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubles]]:
+    """Of each joint its vertices, counted over all meshes, and their weights.
+
+    Args:
+        meshes: of the face.
+        joints: how many it has.
+    """
+    vertices, owners, weights, first = [], [], [], 0
+    for mesh in meshes:
+        vertex, joint, weight = sk.skin_entries(mesh)
+        vertices.append(vertex + first)
+        owners.append(joint)
+        weights.append(weight)
+        first += len(mesh.positions)
+    vertex = np.concatenate([np.zeros(0, np.int64), *vertices])
+    owner = np.concatenate([np.zeros(0, np.int64), *owners])
+    weight = np.concatenate([np.zeros(0), *weights])
+    order = np.argsort(owner, kind="stable")
+    ends = np.cumsum(np.bincount(owner, minlength=joints))[:-1]
+    return list(
+        zip(np.split(vertex[order], ends), np.split(weight[order], ends), strict=True)
+    )  # a vertex may list a joint twice: both count

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""How far a lighter face is from the one that it was made from, and what it costs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import Dna, Rig
+from .._native import Probe, Skins
+from ..author.geometry.skeleton import Doubles
+from ..author.work import listed_meshes
+from .poses import Pose
+
+_ACTIVE = 60  # controls that move in a pose that is timed, as in captures
+_TIMED = 400
+
+Told = Callable[[float], None]
+
+
+class Vertices:
+    """All vertices of a level, as the evaluator poses them."""
+
+    def __init__(self, dna: Dna, rig: Rig, lod: int) -> None:
+        """Args:
+        dna: the face.
+        rig: compiled from it.
+        lod: the level.
+        """
+        self.meshes = [m for m in listed_meshes(dna, lod) if m < len(dna.meshes)]
+        self.counts = [len(dna.meshes[m].positions) for m in self.meshes]
+        pairs = [
+            np.stack([np.full(n, m), np.arange(n)], axis=1)
+            for m, n in zip(self.meshes, self.counts, strict=True)
+        ]
+        points = np.concatenate([*pairs, np.zeros((0, 2), np.int64)])
+        self.count = len(points)
+        self._skins = Skins(dna, rig, lod)
+        self._probe = Probe(self._skins, points.astype(np.uint32))
+
+    def at(self, raw: npt.NDArray[np.float32]) -> Doubles:
+        """float64[V, 3] with these raw controls."""
+        return np.asarray(self._probe.positions(raw))
+
+
+def errors(
+    before: Dna, after: Dna, rigs: tuple[Rig, Rig], poses: Sequence[Pose], told: Told
+) -> tuple[Doubles, Doubles]:
+    """float64[poses, levels]: largest way between the vertices of two faces, and its root mean
+    square, in the file's unit.
+
+    Args:
+        before: one face.
+        after: the other, with the same levels and meshes.
+        rigs: compiled from them.
+        poses: of both.
+        told: the share that is done.
+    """
+    levels = max(1, before.lod_count)
+    largest, square = np.zeros((2, len(poses), levels))
+    for lod in range(levels):
+        old, new = (Vertices(d, r, lod) for d, r in zip((before, after), rigs, strict=True))
+        if not old.count:
+            continue
+        for at, pose in enumerate(poses):
+            way = ((old.at(pose.raw) - new.at(pose.raw)) ** 2).sum(axis=1)
+            largest[at, lod], square[at, lod] = np.sqrt(way.max()), np.sqrt(way.mean())
+            if at % 32 == 0:
+                told((lod + at / len(poses)) / levels)
+    return largest, square
+
+
+def microseconds(rig: Rig) -> float:
+    """Of a call of the evaluator at the finest level, with sixty controls that move, the median.
+
+    Args:
+        rig: a face.
+    """
+    rng = np.random.default_rng(0)
+    raw = rig.initial_raw_controls
+    times = []
+    for _ in range(_TIMED):
+        posed = raw.copy()
+        moving = rng.choice(len(raw), min(_ACTIVE, len(raw)), replace=False)
+        posed[moving] = rng.random(len(moving))
+        begin = time.perf_counter()
+        rig.evaluate(posed)
+        times.append(time.perf_counter() - begin)
+    return 1e6 * float(np.median(times))

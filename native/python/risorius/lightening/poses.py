@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""The poses that a face is held against: each expression, and each corrective with its controls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import Dna, Rig
+from ..author.geometry import skeleton as sk
+from ..author.geometry.skeleton import Doubles, Ints
+from ..rigs.joint_controls import joint_controls
+
+_AT_ONCE = 1 << 16  # joints that are posed at once: they take 1 kB each
+
+Floats = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Controls of one pose.
+
+    Attributes:
+        name: of the control, or of all controls of a corrective with a + between.
+        raw: float32[R].
+        input: the raw control or corrective, an index of the control space.
+        controls: how many raw controls take part.
+    """
+
+    name: str
+    raw: Floats
+    input: int
+    controls: int
+
+
+def poses_of(dna: Dna, rig: Rig) -> list[Pose]:
+    """Each raw control at 1, then each corrective with all of its controls at 1.
+
+    Controls that hold the rotation of a joint have no pose of their own: their values are no
+    shares. A pose of a solver stands for the rotations at which it is reached.
+
+    Args:
+        dna: the face.
+        rig: compiled from it.
+    """
+    names, rest = dna.raw_control_names, rig.initial_raw_controls
+    turned = {c for joint in joint_controls(dna)[0] for c in joint.controls}
+    out = []
+    for control in range(len(names)):
+        if control not in turned:
+            out.append(_pose(names, rest, {control: 1.0}, control))
+    factors = Factors(dna)
+    for row in range(len(names), len(names) + dna.psd_count):
+        found = factors.of(row)
+        if found:
+            out.append(_pose(names, rest, found, row))
+    return out
+
+
+def _pose(names: Sequence[str], rest: Floats, values: dict[int, float], source: int) -> Pose:
+    raw = rest.copy()
+    for control, value in values.items():
+        raw[control] = value
+    # The name of a solver's pose is that of its joints; four parts each would be no name.
+    shown = dict.fromkeys(
+        names[c].rpartition(".")[0] if names[c].rpartition(".")[2] in ("qx", "qy", "qz", "qw")
+        else names[c] for c in values
+    )  # fmt: skip
+    return Pose(" + ".join(shown), raw, source, len(shown))
+
+
+class Factors:
+    """Which raw controls make correctives fire."""
+
+    def __init__(self, dna: Dna) -> None:
+        """Args:
+        dna: the face.
+        """
+        self.raw = len(dna.raw_control_names)
+        self.parts = sk.psd_parts(dna)
+        self._solved = _solver_poses(dna)
+
+    def of(self, control: int) -> dict[int, float]:
+        """Values of the raw controls at which a control is 1; empty where none makes it so."""
+        values: dict[int, float] = {}
+        waiting, seen = [control], set()
+        while waiting:
+            at = waiting.pop()
+            if at in seen:
+                continue
+            seen.add(at)
+            if at < self.raw:
+                values.setdefault(at, 1.0)
+            elif at in self.parts:
+                waiting += sorted(self.parts[at], reverse=True)
+            elif at in self._solved:
+                values |= self._solved[at]
+            else:
+                return {}
+        return values
+
+
+def _solver_poses(dna: Dna) -> dict[int, dict[int, float]]:
+    """Of each control that a pose of a solver writes: the raw controls at that pose."""
+    behavior = dna.rbf_behavior
+    at_pose: dict[int, dict[int, float]] = {}
+    for solver in behavior.solvers:
+        inputs = np.asarray(solver.raw_control_indices, np.int64)
+        poses = np.asarray(solver.pose_indices, np.int64)
+        values = np.asarray(solver.raw_control_values, np.float64)
+        if len(values) != len(inputs) * len(poses):
+            continue
+        for pose, row in zip(poses.tolist(), values.reshape(len(poses), -1), strict=True):
+            at_pose[pose] = dict(zip(inputs.tolist(), row.tolist(), strict=True))
+    written = dna.rbf_behavior_ext.poses
+    if not written:
+        networks = len(dna.machine_learned_behavior.ml_control_names)
+        first = len(dna.raw_control_names) + dna.psd_count + networks
+        return {first + pose: values for pose, values in at_pose.items()}
+    return {
+        int(control): at_pose[pose]
+        for pose, controls in enumerate(written) if pose in at_pose
+        for control in controls.output_control_indices
+    }  # fmt: skip
+
+
+def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
+    """float64[n, joints, 3, 4]: where joints bring what is fixed to them, about a middle.
+
+    Args:
+        dna: the neutral pose and the tree.
+        deltas: float64[n, joints, 9] beside the neutral pose.
+        middle: float64[3], the origin of what they move.
+    """
+    posed = sk.world_matrices(dna, deltas)
+    rest = sk.world_matrices(dna, np.zeros_like(deltas[0]))
+    out = (posed @ np.linalg.inv(rest))[..., :3, :]
+    out[..., 3] += out[..., :3] @ middle - middle
+    return out
+
+
+def motion_rows(
+    dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], middle: Doubles
+) -> Iterator[Doubles]:
+    """What joints add to points in poses, some poses after the other.
+
+    Args:
+        dna: the face.
+        rig: compiled from it.
+        lod: the level that is evaluated.
+        poses: all of them.
+        middle: float64[3], the origin of the points.
+
+    Yields:
+        float64[n, joints, 3, 4] of the next n poses.
+    """
+    count = len(dna.joint_names)
+    step = max(1, _AT_ONCE // max(1, count))
+    for begin in range(0, len(poses), step):
+        some = poses[begin : begin + step]
+        found = rig.evaluate_batch(np.stack([pose.raw for pose in some]), lod=lod)
+        deltas = np.asarray(found.joints, np.float64).reshape(len(some), count, 9)
+        yield motions_at(dna, deltas, middle) - np.eye(3, 4)
+
+
+def descendants(parents: Ints, joint: int) -> Ints:
+    """The joint and all that hang on it.
+
+    Args:
+        parents: int64[J].
+        joint: an index.
+    """
+    below = np.zeros(len(parents), bool)
+    below[joint] = True
+    for _ in range(len(parents)):
+        more = below | below[parents]
+        if (more == below).all():
+            break
+        below = more
+    return np.flatnonzero(below)

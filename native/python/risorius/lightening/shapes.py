@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: MIT
+"""What joints no longer do, put into blend shapes."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+
+import numpy as np
+
+from .. import BlendShapeTarget, Dna, Mesh, Rig
+from ..author.geometry import skeleton as sk
+from ..author.geometry.skeleton import Doubles, Ints
+from .measure import Told, Vertices
+from .poses import Pose, motion_rows
+
+_LEAST_VALUE = 1e-3  # a corrective that fires less than this can hold nothing
+
+
+def add_shapes(
+    before: Dna, after: Dna, poses: Sequence[tuple[Pose, Pose]], tolerance: float, told: Told
+) -> Dna:
+    """The lighter face with blend shapes for what vertices are further off than a tolerance.
+
+    Expressions come first, then correctives of two controls, of three and so on: each holds what
+    those before leave. Levels get them where they have blend shapes.
+
+    Args:
+        before: the face that it was made from, with the same levels and meshes.
+        after: the lighter face; it stays as it is.
+        poses: of before, and the same pose of after.
+        tolerance: in the file's unit.
+        told: the share that is done.
+    """
+    stages: dict[int, list[tuple[Pose, Pose]]] = {}
+    raw = len(after.raw_control_names)
+    for pair in poses:
+        own = pair[1]
+        stages.setdefault(0 if own.input < raw else min(own.controls, 4), []).append(pair)
+    old = Rig(before)
+    done = 0
+    for stage in sorted(stages):
+        after = _add_stage(before, after, old, stages[stage], tolerance)
+        done += len(stages[stage])
+        told(done / len(poses))
+    return after
+
+
+def _add_stage(
+    before: Dna, after: Dna, old: Rig, poses: Sequence[tuple[Pose, Pose]], tolerance: float
+) -> Dna:
+    """Blend shapes for some poses, all against the same face."""
+    new = Rig(after)
+    found: dict[tuple[int, int], tuple[Ints, Doubles]] = {}  # mesh, input: vertices, deltas
+    for lod in range(after.lod_count):
+        if not _has_shapes(after, lod):
+            continue
+        goal, own = Vertices(before, old, lod), Vertices(after, new, lod)
+        weights = [sk.dense_weights(after.meshes[m], len(after.joint_names)) for m in own.meshes]
+        at = 0
+        for rows in motion_rows(after, new, lod, [pose for _, pose in poses], np.zeros(3)):
+            for motions in rows + np.eye(3, 4):
+                theirs, mine = poses[at]
+                at += 1
+                way = goal.at(theirs.raw) - own.at(mine.raw)
+                if np.linalg.norm(way, axis=1).max(initial=0.0) <= tolerance:
+                    continue
+                controls = new.evaluate(mine.raw, lod=lod).controls
+                value = float(controls[mine.input])
+                if value < _LEAST_VALUE:
+                    continue
+                parts = np.split(way, np.cumsum(own.counts)[:-1])
+                for m, part, weight in zip(own.meshes, parts, weights, strict=True):
+                    moved = np.flatnonzero(np.linalg.norm(part, axis=1) > tolerance)
+                    if len(moved) and (m, mine.input) not in found:
+                        turn = (weight[moved] @ motions.reshape(-1, 12)).reshape(-1, 3, 4)[..., :3]
+                        shape = np.linalg.solve(turn, part[moved][..., None])[..., 0] / value
+                        found[m, mine.input] = moved, shape
+    return _with_shapes(after, found)
+
+
+def _has_shapes(dna: Dna, lod: int) -> bool:
+    lods = dna.blend_shape_channels.lods
+    return lod < len(lods) and int(lods[lod]) > 0
+
+
+def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -> Dna:
+    """The face with these deltas beside those that it has."""
+    out = copy.copy(dna)
+    channels = dna.blend_shape_channels
+    drives = {
+        int(source): int(channel)
+        for source, channel in zip(channels.input_indices, channels.output_indices, strict=True)
+    }
+    missing = sorted({source for _, source in found if source not in drives})
+    drives |= _add_channels(out, missing)
+    meshes = list(out.meshes)
+    for m in sorted({m for m, _ in found}):
+        mine = {drives[s]: deltas for (mesh, s), deltas in found.items() if mesh == m}
+        meshes[m] = _more(meshes[m], mine)
+    out.meshes = meshes
+    pairs = {(int(m), int(c)) for m, c in dna.mesh_blend_shape_channel_mapping}
+    pairs |= {(m, drives[source]) for m, source in found}
+    out.mesh_blend_shape_channel_mapping = np.array(sorted(pairs)).reshape(-1, 2)
+    return out
+
+
+def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
+    """A channel for each of some inputs, before the others: a level has the first so many rows."""
+    if not inputs:
+        return {}
+    first, raw = len(dna.blend_shape_channel_names), dna.raw_control_names
+    names = [
+        raw[s].rpartition(".")[2] if s < len(raw) else f"corrective_{s - len(raw)}" for s in inputs
+    ]
+    new = list(range(first, first + len(inputs)))
+    dna.blend_shape_channel_names = [*dna.blend_shape_channel_names, *names]
+    channels = copy.copy(dna.blend_shape_channels)
+    channels.lods = [int(n) + len(new) * (int(n) > 0) for n in channels.lods]
+    channels.input_indices = [*inputs, *map(int, channels.input_indices)]
+    channels.output_indices = [*new, *map(int, channels.output_indices)]
+    dna.blend_shape_channels = channels
+    mapping = dna.lod_blend_shape_mapping
+    dna.lod_blend_shape_mapping = [
+        [*map(int, mapping[lod]), *(new if len(mapping[lod]) else [])]
+        for lod in range(len(mapping))
+    ]
+    return dict(zip(inputs, new, strict=True))
+
+
+def _more(mesh: Mesh, shapes: dict[int, tuple[Ints, Doubles]]) -> Mesh:
+    """The mesh with more deltas of some channels."""
+    out, targets = copy.copy(mesh), list(mesh.blend_shape_targets)
+    at = {int(target.blend_shape_channel_index): n for n, target in enumerate(targets)}
+    for channel, (vertices, deltas) in sorted(shapes.items()):
+        rows, values = vertices, deltas
+        if channel in at:
+            old = targets[at[channel]]
+            whole = np.concatenate([np.asarray(old.vertex_indices, np.int64), vertices])
+            rows, of = np.unique(whole, return_inverse=True)
+            values = np.zeros((len(rows), 3))
+            np.add.at(values, of.ravel(), np.concatenate([old.deltas, deltas]))
+        made = BlendShapeTarget(
+            deltas=values, vertex_indices=rows, blend_shape_channel_index=channel
+        )
+        if channel in at:
+            targets[at[channel]] = made
+        else:
+            targets.append(made)
+    out.blend_shape_targets = targets
+    return out

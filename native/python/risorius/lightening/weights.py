@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: MIT
+"""Skin weights on the joints that stay, so that vertices go where they went."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+
+from .. import Mesh
+from ..author.geometry import skeleton as sk
+from ..author.geometry.skeleton import Doubles, Ints
+from .simplex import shares
+
+_MOST = 12  # influences of a vertex, as faces of this kind have at most
+_TAKEN_OVER, _NEAR = 14, 6  # joints that a vertex tries
+_AT_ONCE = 512  # vertices
+_EVEN = 3e-3  # how much weights are held to those of the joints that took over, which are smooth
+
+
+class Refit:
+    """Weights of one mesh by products of joints over all poses."""
+
+    def __init__(self, products: Doubles, places: Doubles, parents: Ints, kept: Ints) -> None:
+        """Args:
+        products: float64[J, 4, J, 4], see joints.Leaving, of the mesh' level.
+        places: float64[J, 3] where joints rest, about the middle.
+        parents: int64[J].
+        kept: the joints that stay and that the level lists, ascending.
+        """
+        self.products = np.ascontiguousarray(products.transpose(0, 2, 1, 3))
+        self.places, self.parents, self.kept = places, parents, kept
+
+    def refit(self, mesh: Mesh, points: Doubles, rows: Doubles) -> Mesh:
+        """The mesh with weights on the joints that stay.
+
+        Vertices all of whose joints stay keep theirs to the last bit.
+
+        Args:
+            mesh: with the weights that it had.
+            points: float64[V, 3] about the middle.
+            rows: float64[V, J], the weights after joints took over from others.
+        """
+        had = sk.dense_weights(mesh, len(self.places))
+        stays = np.zeros(len(self.places), bool)
+        stays[self.kept] = True
+        changed = np.flatnonzero(had[:, ~stays].any(axis=1))
+        most = min(_MOST, max(1, int(mesh.maximum_influence_per_vertex) or _MOST))
+        out: dict[int, tuple[Ints, Doubles]] = {}
+        for begin in range(0, len(changed), _AT_ONCE):
+            some = changed[begin : begin + _AT_ONCE]
+            joints, weights = self._some(points[some], had[some], rows[some], most)
+            out |= {
+                int(v): (joints[at][weights[at] > 0], weights[at][weights[at] > 0])
+                for at, v in enumerate(some)
+            }
+        return _with_rows(mesh, out)
+
+    def _some(
+        self, points: Doubles, had: Doubles, rows: Doubles, most: int
+    ) -> tuple[Ints, Doubles]:
+        """Joints and weights [n, k] of some vertices."""
+        own = np.argsort(-had, axis=1, kind="stable")[:, : int((had > 0).sum(axis=1).max())]
+        held = np.take_along_axis(had, own, axis=1)
+        tried = self._tried(points, rows)
+        p = np.concatenate([points, np.ones((len(points), 1))], axis=1)
+        gram = np.einsum(
+            "vr,vklrs,vs->vkl", p, self.products[tried[:, :, None], tried[:, None]], p,
+            optimize=True,
+        )  # fmt: skip
+        right = np.einsum(
+            "vr,vkjrs,vs,vj->vk", p, self.products[tried[:, :, None], own[:, None]], p, held,
+            optimize=True,
+        )  # fmt: skip
+        start = np.take_along_axis(rows, tried, axis=1)
+        same = (tried[:, :, None] == tried[:, None]) & np.tri(tried.shape[1], k=-1, dtype=bool)
+        twice = same.any(axis=2)  # a joint that is tried already
+        start[twice] = 0
+        start /= np.maximum(start.sum(axis=1, keepdims=True), 1e-30)
+        # A joint that is there twice never pays.
+        at = np.arange(tried.shape[1])
+        diagonal = np.einsum("vkk->vk", gram)
+        gram[:, at, at] += np.where(twice, 1e3 * diagonal.max(axis=1, keepdims=True) + 1e-12, 0)
+        even = _EVEN * diagonal.mean(axis=1)
+        gram[:, at, at] += even[:, None]
+        found = shares(gram, right + even[:, None] * start, most)
+        return tried, found
+
+    def _tried(self, points: Doubles, rows: Doubles) -> Ints:
+        """int64[n, k]: joints that took over, near ones, and one that the first hangs on."""
+        took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
+        places = self.places[self.kept]
+        apart = (points**2).sum(1)[:, None] - 2 * points @ places.T + (places**2).sum(1)
+        near = self.kept[np.argsort(apart, axis=1, kind="stable")[:, :_NEAR]]
+        above = self.parents[took[:, :1]]
+        above = np.where(np.isin(above, self.kept), above, took[:, :1])
+        return np.concatenate([took, above, near], axis=1)
+
+
+def _with_rows(mesh: Mesh, rows: dict[int, tuple[Ints, Doubles]]) -> Mesh:
+    """The mesh with other weights of some vertices."""
+    out = copy.copy(mesh)
+    offsets = np.asarray(mesh.skin_offsets, np.int64)
+    joints = np.split(np.asarray(mesh.skin_joint_indices, np.int64), offsets[1:-1])
+    weights = np.split(np.asarray(mesh.skin_weights, np.float64), offsets[1:-1])
+    for vertex, (joint, weight) in rows.items():
+        joints[vertex], weights[vertex] = joint, weight
+    counts = [len(row) for row in joints]
+    out.skin_offsets = np.concatenate([[0], np.cumsum(counts)])
+    out.skin_joint_indices = np.concatenate(joints)
+    out.skin_weights = np.concatenate(weights)
+    return out
