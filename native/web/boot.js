@@ -2,7 +2,8 @@
 // Unpacks the viewer and runs it. It stands as it is in the page and in scripts for pages of others.
 (async () => {
   if (globalThis.customElements.get("risorius-face")) return;
-  const text = document.getElementById("viewer")?.textContent ?? Object.values(globalThis.risoriusFaces)[0].files.viewer;
+  const faces = globalThis.risoriusFaces; // of scripts; a page of others may have its own #viewer
+  const text = faces ? Object.values(faces)[0].files.viewer : document.getElementById("viewer").textContent;
   const packed = Uint8Array.from(atob(text.trim()), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const script = document.createElement("script");

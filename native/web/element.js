@@ -20,7 +20,7 @@ p { position: absolute; inset: 40% 0 auto; margin: 0; padding: 0 16px; text-alig
 
 class RisoriusFace extends HTMLElement {
   connectedCallback() {
-    if (this.shadowRoot) return; // only moved on its page
+    if (this.shadowRoot) return void this.viewer?.turn(); // put back on its page
     const root = this.attachShadow({ mode: "open" });
     root.innerHTML = INSIDE;
     this.addEventListener("dragover", (event) => event.preventDefault());

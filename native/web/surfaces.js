@@ -60,7 +60,7 @@ function skin(material, wrinkles, sets) {
   let name = "skin";
   // The tone curve takes colour from what is bright.
   fragment.push(["#include <color_fragment>", `#include <color_fragment>
-	diffuseColor.rgb = max( mix( vec3( dot( diffuseColor.rgb, vec3( 0.2126, 0.7152, 0.0722 ) ) ), diffuseColor.rgb, 1.22 ), 0.0 );`]);
+	diffuseColor.rgb = max( mix( vec3( dot( diffuseColor.rgb, vec3( 0.2126, 0.7152, 0.0722 ) ) ), diffuseColor.rgb, 1.13 ), 0.0 );`]);
   if (wrinkles && material.map) {
     uniforms.amountMap = { value: wrinkles.target.texture };
     fragment.push(["#include <map_fragment>", `#include <map_fragment>
@@ -115,6 +115,11 @@ function eyes(material) {
 // A card has the skin's normal on both of its sides.
 const OUTWARD = ["#include <normal_fragment_begin>", replaced(ShaderChunk.normal_fragment_begin,
   ["float faceDirection = gl_FrontFacing ? 1.0 : - 1.0;", "float faceDirection = 1.0;"])];
+
+// Hairs are finer than the texels of their picture, and light that goes through them shows their colour.
+const FINE = ["#include <alphamap_fragment>", `#include <alphamap_fragment>
+	diffuseColor.a = pow( diffuseColor.a, 1.2 );
+	diffuseColor.rgb *= 1.4;`];
 
 // Cards without a picture: hairs side by side along them, as Blender's nodes draw lashes.
 const HAIRS = ["#include <alphamap_fragment>", `
@@ -215,7 +220,7 @@ export class Surfaces {
     if (kind !== "hair" && kind !== "lashes") return [material];
     material.alphaMap = await use("alpha", NoColorSpace);
     const bare = !material.alphaMap && !about.cut;
-    const card = (one) => change(one, `card ${bare}`, bare ? [OUTWARD, HAIRS] : [OUTWARD]);
+    const card = (one) => change(one, `card ${bare}`, [OUTWARD, bare ? HAIRS : FINE]);
     if (bare) material.defines.USE_UV = "";
     card(material);
     material.alphaTest = 0.85;

@@ -185,8 +185,11 @@ export class Viewer {
   }
 
   turn() {
+    if (this.turning) return;
+    this.turning = true;
     const again = () => {
-      if (!this.canvas.isConnected) return; // an element that was taken off its page
+      this.turning = this.canvas.isConnected; // an element may be taken off its page
+      if (!this.turning) return;
       requestAnimationFrame(again);
       this.player.step();
       if (this.changed) this.pose();

@@ -162,15 +162,16 @@ async def _dropped(one: Browser, file: Path, clip: risorius.Clip, face: Path) ->
     if played != "played":
         raise RuntimeError(f"{file.name}: {played}")
     names = risorius.load(face, layers="definition").raw_control_names
-    worst = 0.0
+    worst, compared = 0.0, 0
     for frame in (20, 47):
         found = await one.evaluate(f"risorius.player.seek({frame / 60}), [...risorius.raw]")
         for name, curve in zip(clip.names, clip.curves, strict=True):
             if name in names:
+                compared += 1
                 worst = max(worst, abs(found[names.index(name)] - float(curve[frame])))
-    if worst > _ALIKE:
-        raise RuntimeError(f"{file.name}: a control is {worst:.4f} off")
-    return f"{file.name} plays: controls as Python has them to {worst:.1e}"
+    if worst > _ALIKE or compared < 100:
+        raise RuntimeError(f"{file.name}: of {compared} values the worst is {worst:.4f} off")
+    return f"{file.name} plays: {compared} values of controls as Python has them to {worst:.1e}"
 
 
 async def _touch(one: Browser, page: Path) -> str:
@@ -200,11 +201,12 @@ async def _touch(one: Browser, page: Path) -> str:
     place = await one.evaluate(
         "(() => { const s = document.querySelector('.row input');"
         " s.scrollIntoView({block: 'center'}); const b = s.getBoundingClientRect();"
-        " return [b.left + 0.6 * b.width, b.top + b.height / 2]; })()"
+        " return [b.left + 11, b.top + b.height / 2, b.width]; })()"
     )
-    await strokes(((int(place[0]), int(place[1])), (int(place[0]) + 2, int(place[1]))))
+    thumb, at = int(place[0]), int(place[1])
+    await strokes(((thumb, at), (thumb + int(0.6 * place[2]), at)))
     value = await one.evaluate("document.querySelector('.row input').valueAsNumber")
-    if np.allclose(rest, turned, atol=1e-3) or not near < 0.9 * far or not 0.3 < value < 0.9:
+    if np.allclose(rest, turned, atol=1e-3) or not near < 0.9 * far or not 0.2 < value < 0.95:
         raise RuntimeError(
             f"touch: from {rest} to {turned}, {far} to {near} away, a slider at {value}"
         )

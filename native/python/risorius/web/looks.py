@@ -32,7 +32,7 @@ _SIZES = {
     "color": (1024, 82),
     "hair": (512, 75),
     "alpha": (1024, 72),
-    "normal": (1024, 80),
+    "normal": (1024, 87),
     "roughness": (512, 75),
     "wrinkles": (512, 84),
     "masks": (1024, 80),
