@@ -15,6 +15,8 @@ export class Stage {
     this.renderer.toneMapping = AgXToneMapping;
     this.renderer.toneMappingExposure = 1.0;
     this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.autoUpdate = false; // lights stand still: who walks round a face needs none anew
+    this.moved = true;
     this.renderer.shadowMap.type = PCFSoftShadowMap;
     this.scene = new Scene();
     const room = new PMREMGenerator(this.renderer);
@@ -95,6 +97,8 @@ export class Stage {
     if (!this.dirty) return false;
     this.dirty = false;
     for (const wrinkles of this.wrinkles) wrinkles.draw(this.renderer);
+    this.renderer.shadowMap.needsUpdate = this.moved;
+    this.moved = false;
     this.renderer.render(this.scene, this.camera);
     return true;
   }

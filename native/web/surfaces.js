@@ -134,13 +134,12 @@ const HAIRS = ["#include <alphamap_fragment>", `
 	diffuseColor.rgb *= 0.6 + 0.8 * hair;`];
 
 const KINDS = {
-  skin: { roughness: 0.52, specularIntensity: 0.6, clearcoat: 0.05, clearcoatRoughness: 0.4 },
+  skin: { roughness: 0.52, specularIntensity: 0.65 },
   eyes: { roughness: 0.34, clearcoat: 0.5, clearcoatRoughness: 0.06, specularIntensity: 0.4 },
   teeth: { roughness: 0.3, clearcoat: 0.35, clearcoatRoughness: 0.12 },
   tongue: { roughness: 0.42, clearcoat: 0.5, clearcoatRoughness: 0.16 },
   gum: { roughness: 0.42, clearcoat: 0.5, clearcoatRoughness: 0.16 },
-  cloth: { color: linear(0.055, 0.065, 0.08), roughness: 0.85, sheen: 0.25, sheenRoughness: 0.5,
-    sheenColor: linear(0.5, 0.5, 0.5), specularIntensity: 0.5 },
+  cloth: { color: linear(0.055, 0.065, 0.08), roughness: 0.85, specularIntensity: 0.5 },
   hair: { color: linear(0.06, 0.045, 0.035), roughness: 0.55, metalness: 0.12, specularIntensity: 0.25, side: DoubleSide },
   lashes: { color: linear(0.012, 0.007, 0.005), roughness: 0.6, specularIntensity: 0.3, side: DoubleSide },
   // Only what it mirrors is seen of a film.

@@ -125,7 +125,7 @@ export class Viewer {
     this.cost.evaluated = evaluated - begin;
     this.cost.moved = performance.now() - evaluated;
     this.changed = false;
-    this.stage.dirty = true;
+    this.stage.dirty = this.stage.moved = true;
   }
 
   /** In: values by the name of a raw control, with or without what stands before its dot. */
