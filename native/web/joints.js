@@ -18,9 +18,9 @@ export function toScene(skeleton) {
 export class Joints {
   constructor(skeleton) {
     this.skeleton = skeleton;
+    this.scene = toScene(skeleton);
     this.order = this.parentsFirst();
     this.world = Array.from({ length: skeleton.count }, () => new Matrix4());
-    this.skin = new Float32Array(12 * skeleton.count); // rows of 3x4 matrices
     this.parts = [new Vector3(), new Quaternion(), new Vector3(), new Quaternion()];
     this.turns = new Map(); // joint -> Quaternion about its own axes, see turn
     this.rest = new Float32Array(skeleton.count * skeleton.stride);
@@ -84,18 +84,22 @@ export class Joints {
     }
   }
 
-  /** What takes a vertex at rest along with each joint. In: as place. */
-  pose(values) {
+  /** What takes a vertex at rest along with each joint, into the scene; behind them what is still.
+   * In: values as place; out: float32[joints + 1, 16], columns, and which of them are other now. */
+  pose(values, out, changed) {
     this.place(values);
     const product = new Matrix4();
-    for (let j = 0; j < this.world.length; ++j) {
-      const e = product.multiplyMatrices(this.world[j], this.inverse[j]).elements;
-      for (let row = 0; row < 3; ++row) {
-        for (let column = 0; column < 4; ++column) {
-          this.skin[12 * j + 4 * row + column] = e[4 * column + row];
-        }
+    for (let j = 0; j <= this.world.length; ++j) {
+      product.copy(this.scene);
+      if (j < this.world.length) product.multiply(this.world[j]).multiply(this.inverse[j]);
+      const { elements } = product;
+      let differs = 0;
+      for (let i = 0; i < 16; ++i) {
+        const value = Math.fround(elements[i]);
+        if (out[16 * j + i] !== value) differs = 1;
+        out[16 * j + i] = value;
       }
+      changed[j] = differs;
     }
-    return this.skin;
   }
 }

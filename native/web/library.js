@@ -3,7 +3,7 @@
 // structs with pointers of 4 bytes.
 
 export const List = { RAW: 0, GUI: 1, JOINTS: 2, SHAPES: 3, MAPS: 4, MESHES: 5, LODS: 6 };
-const GEOMETRY_AND_TARGETS = 3;
+const NO_GEOMETRY = 0;
 const ABI = 1;
 
 export class FaceError extends Error {}
@@ -62,6 +62,37 @@ export class Library {
     if (pointer === 0 && size > 0) throw new FaceError("The browser gives no more memory.");
     return pointer;
   }
+  /** A copy of an array that stays, on a border of 16 bytes. Out: where it lies. */
+  place(array) {
+    const at = (this.reserve(array.byteLength + 16) + 15) & ~15;
+    this.numbers(Uint8Array, at, array.byteLength).set(new Uint8Array(array.buffer, array.byteOffset, array.byteLength));
+    return at;
+  }
+  /** A clip out of the bytes of a .rzc file: {rate, start, names, curves: [Float32Array], times}. */
+  clip(bytes) {
+    return this.with(bytes.length, (data) => {
+      this.numbers(Uint8Array, data, bytes.length).set(bytes);
+      const at = this.c.page_clip(data, bytes.length);
+      const [rate, start] = this.copy(Float64Array, at, 2);
+      const [controls, frames, names, curves, times, error] = this.copy(Uint32Array, at + 16, 6);
+      if (error !== 0) throw new FaceError(this.text(error));
+      const found = [];
+      for (let i = 0, place = names; i < controls; ++i) {
+        const bytes = new Uint8Array(this.c.memory.buffer, place);
+        const size = bytes.indexOf(0);
+        found.push(new TextDecoder().decode(bytes.slice(0, size)));
+        place += size + 1;
+      }
+      return {
+        rate,
+        names: found,
+        curves: found.map((_, i) => this.copy(Float32Array, curves + 4 * i * frames, frames)),
+        times: times === 0
+          ? Float64Array.from({ length: frames }, (_, i) => start + i / rate)
+          : this.copy(Float64Array, times, frames),
+      };
+    });
+  }
   /** Calls body with memory that is free again afterwards. */
   with(size, body) {
     const pointer = this.reserve(size);
@@ -89,7 +120,7 @@ export class Library {
       return this.with(24, (options) => {
         const words = this.numbers(Uint32Array, options, 6);
         words.fill(0);
-        words[0] = GEOMETRY_AND_TARGETS;
+        words[0] = NO_GEOMETRY;
         const face = options + 20;
         this.check(this.c.risorius_open_memory(data, bytes.length, options, face));
         return new Face(this, this.numbers(Uint32Array, face, 1)[0]);
@@ -135,43 +166,6 @@ class Face {
         axes: words.slice(6, 9),
         order: words[9],
         signs: new Int32Array(words.slice(10, 13).buffer),
-      };
-    });
-  }
-  mesh(index) {
-    const { library } = this;
-    return library.with(68, (out) => {
-      library.check(library.c.risorius_get_mesh(this.pointer, index, out));
-      const w = library.copy(Uint32Array, out, 17);
-      const [vertices, uvs, , corners, polygons, targets] = w;
-      const begins = library.copy(Uint32Array, w[12], polygons + 1);
-      const skin = library.copy(Uint32Array, w[14], vertices + 1);
-      const influences = skin.length ? skin[vertices] : 0;
-      return {
-        vertices,
-        positions: library.copy(Float32Array, w[6], 3 * vertices),
-        uvCount: uvs,
-        uvs: library.copy(Float32Array, w[7], 2 * uvs),
-        cornerPositions: library.copy(Uint32Array, w[9], corners),
-        cornerUvs: library.copy(Uint32Array, w[10], corners),
-        begins,
-        polygonCorners: library.copy(Uint32Array, w[13], begins.length ? begins[polygons] : 0),
-        skin,
-        weights: library.copy(Float32Array, w[15], influences),
-        joints: library.copy(Uint16Array, w[16], influences),
-        targets: Array.from({ length: targets }, (_, i) => this.target(index, i)),
-      };
-    });
-  }
-  target(mesh, index) {
-    const { library } = this;
-    return library.with(16, (out) => {
-      library.check(library.c.risorius_get_target(this.pointer, mesh, index, out));
-      const [shape, count, vertices, deltas] = library.copy(Uint32Array, out, 4);
-      return {
-        shape,
-        vertices: library.copy(Uint32Array, vertices, count),
-        deltas: library.copy(Float32Array, deltas, 3 * count),
       };
     });
   }

@@ -1,156 +1,82 @@
 // SPDX-License-Identifier: MIT
-// The page: a face, its sliders, its levels of detail, a clip.
-import { bytes, table } from "./content.js";
-import { Joints, toScene } from "./joints.js";
-import { FaceError, Library, List } from "./library.js";
+// The page: a face, its sliders, its levels of detail, a clip. And <risorius-face>, which pages of others
+// have (element.js).
+import { inPage } from "./content.js";
+import { define } from "./element.js";
 import { Panel } from "./panel.js";
-import { Player } from "./player.js";
-import { Stage, materialOf, meshOf } from "./scene.js";
-import { Skin } from "./skin.js";
+import { Viewer, sentence } from "./viewer.js";
 
 const $ = (id) => document.getElementById(id);
 
 function complain(error) {
-  // Without exceptions the library ends where it has no memory.
-  const text =
-    error instanceof WebAssembly.RuntimeError
-      ? `The face asks for more memory than the browser gives (${error.message}).`
-      : `${error?.message ?? error}`;
   $("error").hidden = false;
-  $("error-text").textContent = text;
+  $("error-text").textContent = sentence(error);
   $("wait").hidden = true;
-  document.body.dataset.state = "error";
 }
-addEventListener("error", (event) => complain(event.error ?? event.message));
-addEventListener("unhandledrejection", (event) => complain(event.reason));
 
-class Viewer {
+class Page extends Viewer {
+  constructor() {
+    super(inPage, $("canvas"), $("player"));
+  }
   async open() {
-    const about = table();
-    document.title = about.title;
-    $("title").textContent = about.title;
-    this.stage = new Stage($("canvas"));
-    this.library = await Library.load(await bytes("library"));
-    this.face = this.library.open(await bytes("face"));
-    this.instance = this.face.instance();
-    this.raw = this.instance.values(List.RAW).slice();
-    this.rest = this.raw.slice();
-    this.joints = new Joints(this.face.skeleton());
-    this.scene = toScene(this.joints.skeleton);
-    await this.makeMeshes(about.pictures);
-    this.panel = new Panel($("panel"), about.regions, this.face.names(List.RAW), (i, value) => {
+    const { title, regions } = inPage.table;
+    document.title = title;
+    $("title").textContent = title;
+    await super.open();
+    this.panel = new Panel($("panel"), regions, this.controls, (i, value) => {
       this.raw[i] = value;
       this.changed = true;
     });
+    this.heard = (i, value) => this.panel.show(i, value);
+    this.raw.forEach((value, i) => this.panel.show(i, value));
     this.chooseLods();
-    this.setLod(0);
-    this.stage.resize();
-    this.stage.frame();
-    await this.makePlayer(about.clip);
     this.wire();
   }
-
-  /** Meshes of all levels: only those of the one that is shown are moved. */
-  async makeMeshes(pictures) {
-    const names = this.face.names(List.MESHES);
-    this.parts = new Map();
-    const materials = new Map();
-    for (let i = 0; i < names.length; ++i) {
-      const mesh = this.face.mesh(i);
-      if (mesh.vertices === 0) continue;
-      const own = pictures[names[i]] ?? {};
-      const key = JSON.stringify([names[i].replace(/_lod\d+.*/i, ""), own]);
-      if (!materials.has(key)) materials.set(key, await materialOf(names[i], own));
-      const skin = new Skin(mesh, this.scene);
-      this.parts.set(i, { skin, object: meshOf(skin, materials.get(key)) });
-    }
-    if (this.parts.size === 0) throw new FaceError("This file has no meshes: there is nothing to show.");
-  }
-
   chooseLods() {
-    const count = Math.max(this.face.count(List.LODS), 1);
-    for (let lod = 0; lod < count; ++lod) $("lod").add(new Option(`LOD ${lod}`, lod));
-    $("lod").disabled = count < 2;
-    $("lod").addEventListener("change", () => this.setLod(Number($("lod").value)));
+    for (let lod = 0; lod < this.levels; ++lod) $("lod").add(new Option(`LOD ${lod}`, lod));
+    $("lod").disabled = this.levels < 2;
+    $("lod").addEventListener("change", () => this.setLod(Number($("lod").value)).catch(complain));
   }
-  setLod(lod) {
-    if (this.face.count(List.LODS) > 0) this.instance.setLod(lod);
-    const listed = this.face.count(List.LODS) > 0 ? [...this.face.itemsOf(List.MESHES, lod)] : [];
-    const shown = listed.filter((i) => this.parts.has(i));
-    this.shown = (shown.length > 0 ? shown : [...this.parts.keys()]).map((i) => this.parts.get(i));
-    this.stage.face.clear();
-    this.stage.face.add(...this.shown.map((part) => part.object));
-    this.vertices = this.shown.reduce((sum, part) => sum + part.skin.mesh.vertices, 0);
-    this.pose();
+  wire() {
+    $("reset").addEventListener("click", () => this.reset());
+    $("home").addEventListener("click", () => this.stage.home());
+    $("dismiss").addEventListener("click", () => ($("error").hidden = true));
+    addEventListener("keydown", (event) => {
+      if (event.code !== "Space" || event.target.closest("input[type=search], button, select")) return;
+      event.preventDefault();
+      if (this.player.clip) this.player.button.click();
+    });
+    const take = (files) => this.play(files).catch(complain);
+    $("open").addEventListener("click", () => $("file").click());
+    $("file").addEventListener("change", () => take($("file").files));
+    addEventListener("dragover", (event) => event.preventDefault());
+    addEventListener("drop", (event) => {
+      event.preventDefault();
+      take(event.dataTransfer.files);
+    });
   }
-
-  pose() {
-    const begin = performance.now();
-    this.instance.setRaw(this.raw);
-    this.instance.evaluate();
-    this.cost = performance.now() - begin;
-    const skin = this.joints.pose(this.instance.values(List.JOINTS));
-    const weights = this.instance.values(List.SHAPES).slice();
-    for (const part of this.shown) part.skin.pose(skin, weights);
-    this.changed = false;
-    this.stage.dirty = true;
-    this.read();
-  }
-  read() {
+  drawn() {
     const now = performance.now();
     if (now - (this.wasRead ?? 0) < 250) return;
     this.wasRead = now;
-    $("facts").textContent =
-      `${this.vertices.toLocaleString("en")} vertices · evaluated in ${this.cost.toFixed(2)} ms`;
-  }
-
-  async makePlayer(clip) {
-    if (!clip) return;
-    const packed = await bytes("clip");
-    const values = new Float32Array(packed.buffer, packed.byteOffset, packed.byteLength / 4);
-    this.player = new Player($("player"), clip, values, clip.sound, (pairs, turns) => {
-      for (const [control, value] of pairs) {
-        this.raw[control] = value;
-        this.panel.show(control, value);
-      }
-      this.joints.turn(turns);
-      this.changed = true;
-    });
-  }
-
-  wire() {
-    $("reset").addEventListener("click", () => {
-      this.player?.pause();
-      this.raw.set(this.rest);
-      this.joints.turn([]);
-      this.raw.forEach((value, i) => this.panel.show(i, value));
-      this.changed = true;
-    });
-    $("home").addEventListener("click", () => this.stage.home());
-    $("dismiss").addEventListener("click", () => ($("error").hidden = true));
-    new ResizeObserver(() => this.stage.resize()).observe($("canvas").parentElement);
-    const turn = () => {
-      requestAnimationFrame(turn);
-      this.player?.step();
-      if (this.changed) this.pose();
-      this.stage.draw();
-    };
-    turn();
-  }
-
-  /** For tests: a pose by numbers, as Python has it. */
-  evaluate(raw, lod) {
-    this.instance.setLod(lod);
-    this.instance.setRaw(raw);
-    this.instance.evaluate();
-    const values = (list) => Array.from(this.instance.values(list));
-    return { joints: values(List.JOINTS), shapes: values(List.SHAPES), maps: values(List.MAPS) };
+    const { evaluated, moved, drawn } = this.cost;
+    $("facts").textContent = `${this.vertices.toLocaleString("en")} vertices · evaluated in ${evaluated.toFixed(1)} ms, ` +
+      `moved in ${moved.toFixed(1)} ms, drawn in ${drawn.toFixed(1)} ms`;
   }
 }
 
-const viewer = new Viewer();
-globalThis.risorius = viewer;
-viewer.open().then(() => {
-  $("wait").hidden = true;
-  document.body.dataset.state = "ready";
-}, complain);
+define();
+if ($("face-table") !== null) {
+  const fail = (error) => {
+    complain(error);
+    if (document.body.dataset.state === "loading") document.body.dataset.state = "error";
+  };
+  addEventListener("error", (event) => fail(event.error ?? event.message));
+  addEventListener("unhandledrejection", (event) => fail(event.reason));
+  const page = new Page();
+  globalThis.risorius = page;
+  page.open().then(() => {
+    $("wait").hidden = true;
+    document.body.dataset.state = "ready";
+  }, fail);
+}

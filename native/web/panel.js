@@ -22,7 +22,7 @@ export class Panel {
     this.mirror = root.querySelector("#mirror");
     this.list = root.querySelector("#regions");
     this.empty = root.querySelector("#nothing");
-    for (const region of regions) this.list.append(this.section(region));
+    this.list.append(...regions.map((region, at) => this.section(region, at)));
     const search = root.querySelector("#search");
     search.addEventListener("input", () => this.search(search.value));
   }

@@ -2,36 +2,42 @@
 // A clip on the face, with its sound.
 
 export class Player {
-  /** In: clip {rate, frames, controls: [index], turns: [joint]}; values float32[frames, controls + 4 * turns]; sound: {url, offset} or null. */
-  constructor(root, clip, values, sound, shown) {
-    this.clip = clip;
-    this.values = values;
+  /** In: the bar with #play, #time and #clock; shown([[control, value]], [[joint, quaternion]]). */
+  constructor(root, shown) {
+    this.root = root;
     this.shown = shown;
-    this.time = 0;
+    this.clip = this.audio = null;
+    this.time = this.length = 0;
     this.playing = false;
-    this.audio = sound ? new Audio(sound.url) : null;
-    this.offset = sound?.offset ?? 0;
-    this.length = Math.max(clip.frames - 1, 1) / clip.rate;
     this.button = root.querySelector("#play");
     this.slider = root.querySelector("#time");
     this.clock = root.querySelector("#clock");
-    this.slider.max = this.length;
-    this.slider.step = "any";
-    root.hidden = false;
     this.button.addEventListener("click", () => (this.playing ? this.pause() : this.play()));
     this.slider.addEventListener("input", () => {
       this.pause();
       this.seek(this.slider.valueAsNumber);
     });
-    addEventListener("keydown", (event) => {
-      if (event.code !== "Space" || event.target.closest("input[type=search], button")) return;
-      event.preventDefault();
-      this.button.click();
-    });
+  }
+
+  /** In: clip {rate, frames, controls: [index], turns: [joint]}; values float32[frames, controls + 4 * turns]; sound: {url, offset} or null. */
+  load(clip, values, sound) {
+    this.pause();
+    Object.assign(this, { clip, values });
+    this.listen(sound);
+    this.length = Math.max(clip.frames - 1, 1) / clip.rate;
+    this.slider.max = this.length;
+    this.slider.step = "any";
+    this.root.hidden = false;
     this.seek(0);
+  }
+  listen(sound) {
+    this.audio = sound ? new Audio(sound.url) : null;
+    this.offset = sound?.offset ?? 0;
+    this.isMute = false;
   }
 
   play() {
+    if (!this.clip) return;
     if (this.time >= this.length) this.time = 0;
     this.playing = true;
     this.began = performance.now() / 1000 - this.time;
@@ -76,6 +82,7 @@ export class Player {
 
   /** Between two frames values are mixed. */
   seek(time) {
+    if (!this.clip) return;
     this.time = time;
     this.slider.value = time;
     this.slider.style.setProperty("--part", `${(100 * time) / this.length}%`);

@@ -1,64 +1,50 @@
 // SPDX-License-Identifier: MIT
-// A mesh that moves: shapes, then joints, then normals. Any number of influences and shapes.
-import { BufferAttribute, BufferGeometry } from "three";
-
-/** Corners that agree in position and texture coordinate are one vertex of the graphics card. */
-function weld(mesh) {
-  const places = new Map();
-  const source = [];
-  const uv = [];
-  const index = [];
-  const vertexOf = (corner) => {
-    const [p, t] = [mesh.cornerPositions[corner], mesh.cornerUvs[corner] ?? 0];
-    const key = p * (mesh.uvCount + 1) + t;
-    let found = places.get(key);
-    if (found === undefined) {
-      found = source.length;
-      places.set(key, found);
-      source.push(p);
-      uv.push(mesh.uvs[t] ?? 0, mesh.uvs[mesh.uvCount + t] ?? 0);
-    }
-    return found;
-  };
-  for (let f = 0; f + 1 < mesh.begins.length; ++f) {
-    const corners = mesh.polygonCorners.subarray(mesh.begins[f], mesh.begins[f + 1]);
-    for (let i = 2; i < corners.length; ++i) {
-      index.push(vertexOf(corners[0]), vertexOf(corners[i - 1]), vertexOf(corners[i]));
-    }
-  }
-  return { source: Uint32Array.from(source), uv: Float32Array.from(uv), index: Uint32Array.from(index) };
-}
+// A mesh that moves: shapes, then joints, then normals, by page.cpp in the library's memory. Any number
+// of influences and shapes.
+import { BufferAttribute, BufferGeometry, InterleavedBuffer, InterleavedBufferAttribute } from "three";
 
 export class Skin {
-  constructor(mesh, toScene) {
+  /** In: the library; a mesh of geometry.js; joints: how many; mirrors: whether the scene's axes do. */
+  constructor(library, mesh, joints, mirrors) {
+    this.library = library;
     this.mesh = mesh;
-    this.scene = toScene.elements;
-    const { source, uv, index } = weld(mesh);
-    this.source = source;
-    this.index = index;
-    this.corners = index.map((v) => source[v]);
-    if (this.turnsInside(toScene)) {
-      for (const list of [index, this.corners]) {
+    this.count = mesh.positions.length / 4;
+    if (mesh.influences.length < 2) this.hang(joints);
+    this.corners = mesh.index.map((v) => mesh.source[v]);
+    if (this.turnsInside(mirrors)) {
+      for (const list of [mesh.index, this.corners]) {
         for (let i = 0; i < list.length; i += 3) [list[i], list[i + 1]] = [list[i + 1], list[i]];
       }
     }
-    this.shaped = new Float32Array(mesh.positions.length);
-    this.placed = new Float32Array(3 * mesh.vertices);
-    this.normals = new Float32Array(3 * mesh.vertices);
+    if (mesh.normals && mesh.kind !== "skin") this.innerFirst();
+    this.joints = [...new Set(mesh.joints)];
+    this.shapes = [...new Set(mesh.channels)];
+    this.place();
     this.geometry = new BufferGeometry();
-    this.geometry.setIndex(new BufferAttribute(index, 1));
-    this.geometry.setAttribute("uv", new BufferAttribute(uv, 2));
-    this.position = new BufferAttribute(new Float32Array(3 * source.length), 3);
-    this.normal = new BufferAttribute(new Float32Array(3 * source.length), 3);
-    this.geometry.setAttribute("position", this.position);
-    this.geometry.setAttribute("normal", this.normal);
+    this.geometry.setIndex(new BufferAttribute(mesh.index, 1));
+    this.geometry.setAttribute("uv", new BufferAttribute(mesh.uvs, 2));
+    this.out = new InterleavedBuffer(this.view(), 6);
+    this.geometry.setAttribute("position", new InterleavedBufferAttribute(this.out, 3, 0));
+    this.geometry.setAttribute("normal", new InterleavedBufferAttribute(this.out, 3, 3));
+  }
+
+  /** A mesh without weights hangs on what stands still: the matrix behind those of the joints. */
+  hang(joints) {
+    const { mesh } = this;
+    mesh.influences = Uint32Array.from({ length: this.count + 1 }, (_, i) => i);
+    mesh.joints = new Uint32Array(this.count).fill(joints);
+    mesh.weights = new Float32Array(this.count).fill(1);
   }
 
   /** Whether the polygons show their backs: files wind them both ways, and axes may mirror. */
-  turnsInside(toScene) {
-    const { positions: p, vertices: n } = this.mesh;
-    const middle = [0, 1, 2].map((k) => p.subarray(k * n, (k + 1) * n).reduce((a, b) => a + b, 0) / n);
-    const at = (v, k) => p[k * n + v] - middle[k];
+  turnsInside(mirrors) {
+    const { positions: p } = this.mesh;
+    const middle = [0, 1, 2].map((k) => {
+      let sum = 0;
+      for (let i = k; i < p.length; i += 4) sum += p[i];
+      return sum / this.count;
+    });
+    const at = (v, k) => p[4 * v + k] - middle[k];
     let volume = 0;
     for (let i = 0; i < this.corners.length; i += 3) {
       const [a, b, c] = this.corners.subarray(i, i + 3);
@@ -66,79 +52,58 @@ export class Skin {
       volume += at(a, 1) * (at(b, 2) * at(c, 0) - at(b, 0) * at(c, 2));
       volume += at(a, 2) * (at(b, 0) * at(c, 1) - at(b, 1) * at(c, 0));
     }
-    return volume * toScene.determinant() < 0;
+    return mirrors ? volume > 0 : volume < 0;
   }
 
-  /** In: skin of Joints.pose, weights float32[channels]. */
-  pose(skin, weights) {
-    this.addShapes(weights);
-    this.addJoints(skin);
-    this.turnNormals();
-    for (let v = 0; v < this.source.length; ++v) {
-      const from = 3 * this.source[v];
+  /** Cards lie around a head: drawn from the innermost out, they cover each other as hair does from
+   * wherever they are seen, and need no sorting for each picture. */
+  innerFirst() {
+    const { positions: p, index } = this.mesh;
+    const sum = [0, 0, 0];
+    for (let i = 0; i < p.length; ++i) if (i % 4 < 3) sum[i % 4] += p[i] / this.count;
+    const far = (t) => {
+      let squares = 0;
       for (let k = 0; k < 3; ++k) {
-        this.position.array[3 * v + k] = this.placed[from + k];
-        this.normal.array[3 * v + k] = this.normals[from + k];
+        const mean = (p[4 * this.corners[t] + k] + p[4 * this.corners[t + 1] + k] + p[4 * this.corners[t + 2] + k]) / 3;
+        squares += (mean - sum[k]) ** 2;
       }
-    }
-    this.position.needsUpdate = true;
-    this.normal.needsUpdate = true;
+      return squares;
+    };
+    const order = Array.from({ length: index.length / 3 }, (_, i) => [far(3 * i), 3 * i]);
+    order.sort((a, b) => a[0] - b[0]);
+    const sorted = (list) => Uint32Array.from(order.flatMap(([, at]) => [list[at], list[at + 1], list[at + 2]]));
+    [this.mesh.index, this.corners] = [sorted(index), sorted(this.corners)];
   }
 
-  addShapes(weights) {
-    const { positions, targets, vertices: count } = this.mesh;
-    this.shaped.set(positions);
-    for (const { shape, vertices, deltas } of targets) {
-      const weight = weights[shape];
-      if (weight === 0) continue;
-      const n = vertices.length;
-      for (let i = 0; i < n; ++i) {
-        const v = vertices[i];
-        this.shaped[v] += weight * deltas[i];
-        this.shaped[count + v] += weight * deltas[n + i];
-        this.shaped[2 * count + v] += weight * deltas[2 * n + i];
-      }
-    }
+  /** Everything that page.cpp reads, into its memory: PageMesh. */
+  place() {
+    const { library, mesh, count } = this;
+    const vertices = mesh.source.length;
+    const room = () => library.place(new Float32Array(4 * count));
+    this.at = library.place(Uint32Array.from([
+      count, vertices, this.corners.length / 3, mesh.channels.length,
+      library.place(mesh.positions), library.place(mesh.source), library.place(this.corners),
+      library.place(mesh.influences), library.place(mesh.joints), library.place(mesh.weights),
+      library.place(mesh.moved), library.place(mesh.channels), library.place(mesh.moves),
+      library.place(mesh.deltas), mesh.normals ? library.place(mesh.normals) : 0,
+      room(), (this.placed = room()), room(), (this.shown = library.place(new Float32Array(6 * vertices))),
+    ]));
+  }
+  view() {
+    return this.library.numbers(Float32Array, this.shown, 6 * this.mesh.source.length);
   }
 
-  addJoints(matrices) {
-    const { skin, weights, joints, vertices: count } = this.mesh;
-    const { shaped, placed, scene: s } = this;
-    for (let v = 0; v < count; ++v) {
-      const [x, y, z] = [shaped[v], shaped[count + v], shaped[2 * count + v]];
-      let [a, b, c] = skin.length ? [0, 0, 0] : [x, y, z];
-      for (let i = skin[v]; i < skin[v + 1]; ++i) {
-        const m = 12 * joints[i];
-        const w = weights[i];
-        a += w * (matrices[m] * x + matrices[m + 1] * y + matrices[m + 2] * z + matrices[m + 3]);
-        b += w * (matrices[m + 4] * x + matrices[m + 5] * y + matrices[m + 6] * z + matrices[m + 7]);
-        c += w * (matrices[m + 8] * x + matrices[m + 9] * y + matrices[m + 10] * z + matrices[m + 11]);
-      }
-      placed[3 * v] = s[0] * a + s[4] * b + s[8] * c;
-      placed[3 * v + 1] = s[1] * a + s[5] * b + s[9] * c;
-      placed[3 * v + 2] = s[2] * a + s[6] * b + s[10] * c;
-    }
-  }
-
-  turnNormals() {
-    const { placed: p, normals: n, corners } = this;
-    n.fill(0);
-    for (let i = 0; i < corners.length; i += 3) {
-      const [a, b, c] = [3 * corners[i], 3 * corners[i + 1], 3 * corners[i + 2]];
-      const [ux, uy, uz] = [p[b] - p[a], p[b + 1] - p[a + 1], p[b + 2] - p[a + 2]];
-      const [vx, vy, vz] = [p[c] - p[a], p[c + 1] - p[a + 1], p[c + 2] - p[a + 2]];
-      const [x, y, z] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
-      for (const at of [a, b, c]) {
-        n[at] += x;
-        n[at + 1] += y;
-        n[at + 2] += z;
-      }
-    }
-    for (let i = 0; i < n.length; i += 3) {
-      const length = Math.hypot(n[i], n[i + 1], n[i + 2]) || 1;
-      n[i] /= length;
-      n[i + 1] /= length;
-      n[i + 2] /= length;
-    }
+  /** In: where matrices (16 floats a joint) and channels lie in the library's memory; which of both
+   * are other than at the last call, or null for all. */
+  pose(matrices, channels, changed) {
+    const moves =
+      changed === null ||
+      this.joints.some((joint) => changed.joints[joint]) ||
+      this.shapes.some((shape) => changed.shapes[shape]);
+    if (!moves) return false;
+    this.library.c.page_pose(this.at, matrices, channels);
+    this.out.array = this.view(); // memory that grew has another place
+    this.out.needsUpdate = true;
+    return true;
   }
 }

@@ -11,7 +11,7 @@ source "$project/packaging/check/works.sh"
 out="$project/build/web"
 logs="$project/build/logs/web"
 venv_zig="$project/build/cross/venv"
-most=1200000 # bytes of the page; packed in the wheel it is about a third
+most=700000 # bytes of the page; packed in the wheel it is about a third
 case "${1:-}" in
   "" | --check) ;;
   *) echo "web.sh: $1 is not --check" >&2 && exit 2 ;;
@@ -34,14 +34,14 @@ get_tools() {
 sources() { # sources FOLDER
   find "$project/native/$1" -name '*.cpp' -not -name 'json_*.cpp' -not -name write.cpp -not -name rig_file.cpp \
     -not -name 'file_*.cpp' -not -name read_at.cpp -not -name change_of_basis.cpp \
-    -not -name coordinates.cpp | LC_ALL=C sort
+    -not -name coordinates.cpp -not -path '*/mixer/*' -not -name '*encode*.cpp' | LC_ALL=C sort
 }
 compile_library() {
   local version exports folder files=() name
   version=$(sed -nE 's/^project\(risorius VERSION ([0-9.]+).*/\1/p' "$project/CMakeLists.txt")
   exports=$(sed -nE 's/^RISORIUS_API .*[ *](risorius_[a-z_]+)\(.*/-Wl,--export=\1/p' "$project/native/api/risorius.h" |
     grep -v open_file)
-  for folder in api bytes compile core dna rig; do
+  for folder in api bytes clip compile core dna rig; do
     sources $folder | sed 's/.*/#include "&"/' > "$out/$folder.cpp"
     # Sizes are 32 bits wide here. Those of a block were held against its bytes, as 64 bits, before.
     [ $folder != rig ] || sed -i '1i #pragma clang diagnostic ignored "-Wc++11-narrowing"' "$out/rig.cpp"
@@ -53,12 +53,13 @@ compile_library() {
   # A browser's only thread has no end to register for.
   echo 'extern "C" int __cxa_thread_atexit(void (*f)(void*), void* p, void* d) { (void)f; (void)p; (void)d; return 0; }' \
     > "$out/thread.cpp"
-  files+=("$out/thread.cpp")
+  files+=("$out/thread.cpp" "$project/native/web/page.cpp")
   # shellcheck disable=SC2086
   "$venv_zig/bin/python" -m ziglang c++ -target wasm32-wasi -mexec-model=reactor -std=c++20 -O3 -msimd128 \
     -ffp-contract=off -fno-exceptions -fno-rtti -fno-sanitize=undefined -fvisibility=hidden -DNDEBUG \
     -DRISORIUS_STATIC -DRISORIUS_VERSION="\"$version\"" -I"$project/native" -I"$out/include" "${files[@]}" \
-    -s -Wl,--gc-sections -Wl,--export=malloc -Wl,--export=free $exports -Wl,--initial-memory=16777216 \
+    -s -Wl,--gc-sections -Wl,--export=malloc -Wl,--export=free \
+    -Wl,--export=page_pose -Wl,--export=page_clip $exports -Wl,--initial-memory=16777216 \
     -Wl,--max-memory=2147483648 -Wl,-z,stack-size=1048576 -o "$out/risorius.wasm"
 }
 bundle() {

@@ -7,19 +7,24 @@ import sys
 from pathlib import Path
 
 sources, built = Path(sys.argv[1]), Path(sys.argv[2])
-script = (built / "viewer.js").read_text(encoding="utf-8")
-if "</script" in script.lower():
+
+
+def packed(name: str, data: bytes) -> str:
+    """An element that holds a file."""
+    text = base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    return f'<script type="application/octet-stream" id="{name}">{text}</script>'
+
+
+library = packed("library", (built / "risorius.wasm").read_bytes())
+viewer = packed("viewer", (built / "viewer.js").read_bytes())
+boot = (sources / "boot.js").read_text(encoding="utf-8")
+if "</script" in boot.lower():
     raise SystemExit("the script would end its own element")
-library = gzip.compress((built / "risorius.wasm").read_bytes(), 9, mtime=0)
-element = (
-    '<script type="application/octet-stream" id="library" data-packed="gzip">'
-    f"{base64.b64encode(library).decode()}</script>"
-)
 page = (sources / "page.html").read_text(encoding="utf-8")
 for mark, text in (
     ("/*STYLE*/", (sources / "style.css").read_text(encoding="utf-8")),
-    ("<!--CONTENT-->", f"<!--FACE-->\n{element}"),
-    ("/*SCRIPT*/", script),
+    ("<!--CONTENT-->", f"<!--FACE-->\n{library}\n{viewer}"),
+    ("/*BOOT*/", f"/*BOOT*/\n{boot}"),
 ):
     if page.count(mark) != 1:
         raise SystemExit(f"{mark} stands {page.count(mark)} times in page.html")

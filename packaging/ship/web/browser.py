@@ -25,6 +25,7 @@ class Browser:
         self._socket = socket
         self._number = 0
         self.said: list[str] = []
+        self.asked: list[str] = []  # addresses that the page asked for
 
     async def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         self._number += 1
@@ -36,6 +37,8 @@ class Browser:
             answer = json.loads(text)
             if answer.get("method") == "Runtime.exceptionThrown":
                 self.said.append(answer["params"]["exceptionDetails"]["text"])
+            if answer.get("method") == "Network.requestWillBeSent":
+                self.asked.append(answer["params"]["request"]["url"])
             if answer.get("id") == wanted:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
@@ -56,6 +59,7 @@ class Browser:
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,
         )  # fmt: skip
+        await self.call("Emulation.setTouchEmulationEnabled", enabled=phone)
         await self.call("Page.navigate", url=page.resolve().as_uri())
         for _ in range(SECONDS * 4):
             await asyncio.sleep(0.25)
@@ -108,4 +112,5 @@ async def _connect(home: Path) -> WebSocketClientConnection:
     one = Browser(page)
     await one.call("Page.enable")
     await one.call("Runtime.enable")
+    await one.call("Network.enable")
     return page

@@ -74,7 +74,7 @@ def page(
     title = rig.name.removesuffix("_rig")
     try:
         made: bytes = web.render(
-            dna, title, pictures=web.find_pictures(dna, source), clip=clip, sound=heard
+            dna, title, looks=web.find_looks(dna, source), clip=clip, sound=heard
         )
     except web.WebError as error:
         raise FaceError(str(error)) from error

@@ -87,13 +87,14 @@ def read_png(data: bytes) -> Floats | None:
     return None if pixels is None else np.asarray(pixels / 255.0)
 
 
-def read_pixels(data: bytes) -> Pixels | None:
+def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
     """As read_png, uint8 from 0 to 255.
 
     Args:
         data: of the file.
+        opacity: read [h, w, 4] too, whose fourth value is the opacity.
     """
-    shape = pixels_of(data)
+    shape = pixels_of(data, opacity=opacity)
     if shape is None:
         return None
     height, width, values = shape
@@ -106,15 +107,16 @@ def read_pixels(data: bytes) -> Pixels | None:
     return pixels[::-1]
 
 
-def pixels_of(data: bytes) -> tuple[int, int, int] | None:
+def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | None:
     """Height, width and values of a pixel that a file says it holds; None: read_png does not
     read such a file.
 
     Args:
         data: of the file.
+        opacity: as of read_pixels.
     """
     width, height, depth, kind = _header(data)
-    values = {0: 1, 2: 3}.get(kind, 0)
+    values = ({0: 1, 2: 3, 6: 4} if opacity else {0: 1, 2: 3}).get(kind, 0)
     if depth != 8 or any(data[26:29]) or not 0 < width * height * values <= 3 * _MOST_TEXELS:
         return None
     return height, width, values

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A face as one web page that needs nothing but a browser."""
 
-from .page import WebError, render
-from .pictures import find_pictures
+from .looks import find_looks
+from .page import WebError, render, render_script
 
-__all__ = ["WebError", "find_pictures", "render"]
+__all__ = ["WebError", "find_looks", "render", "render_script"]

@@ -10,6 +10,7 @@ import base64
 import gzip
 import html
 import json
+import re
 from importlib import resources
 from typing import Any
 
@@ -18,8 +19,10 @@ import numpy as np
 from .._native import Dna
 from ..anim.clip import Clip
 from ..base.errors import RisoriusError
-from ..controls.regions import TITLES, region_of
+from ..controls.regions import TITLES, region_of, short_name
+from ..importing.mapping import load_mapping
 from ..rigs.joint_controls import (
+    ANGLES,
     JointControl,
     bone_turns,
     joint_controls,
@@ -27,10 +30,24 @@ from ..rigs.joint_controls import (
     turn_axes,
     turned_joints,
 )
-from .pictures import Pictures
+from ..rigs.load import load
+from .geometry import pack
+from .looks import Looks, find_looks
 
 _EMPTY = "page.html"
 _MARK = "<!--FACE-->"
+# Of the page that packaging makes: each once, by id.
+_ELEMENT = re.compile(r'<script[^>]* id="(library|viewer)"[^>]*>([^<]*)</script>')
+_BOOT = re.compile(r"<script>(/\*BOOT\*/.*?)</script>", re.DOTALL)
+# Layers of what evaluates; the meshes come beside it, in fewer bytes.
+RIG = (
+    "behavior",
+    "machine_learned_behavior",
+    "rbf_behavior",
+    "joint_behavior_metadata",
+    "twist_swing_behavior",
+)
+_CAPTURES = "live_link_face"  # the mapping for tables that are dropped on the page
 _SOUNDS = {".wav": "audio/wav", ".mp3": "audio/mpeg", ".ogg": "audio/ogg", ".m4a": "audio/mp4"}
 SOUNDS = tuple(_SOUNDS)
 Sound = tuple[bytes, str, float]
@@ -61,7 +78,7 @@ def render(
     dna: Dna,
     title: str,
     *,
-    pictures: Pictures | None = None,
+    looks: Looks | None = None,
     clip: Clip | None = None,
     sound: Sound | None = None,
 ) -> bytes:
@@ -70,7 +87,7 @@ def render(
     Args:
         dna: with behavior and geometry.
         title: of the page.
-        pictures: of the meshes, of find_pictures.
+        looks: materials and pictures, of find_looks; None: plain ones by the names of the meshes.
         clip: that plays on it, of its raw controls and the angles of neck and head.
         sound: what is heard with the clip: the bytes of a file, its ending (one of SOUNDS), and
             at which second of the clip it begins.
@@ -83,31 +100,131 @@ def render(
         DnaError: the face cannot be written.
     """
     page = empty_page()
-    if not any(len(mesh.positions) for mesh in dna.meshes):
-        raise WebError("the file has no meshes: there is nothing to show")
-    names = list(dna.raw_control_names)
-    table: dict[str, Any] = {
-        "title": title,
-        "regions": _regions(names),
-        "pictures": pictures or {},
-        "clip": None,
-    }
-    parts = [_element("face", dna.to_bytes())]
-    if clip is not None:
-        table["clip"], values = _clip(clip, names, dna)
-        table["clip"]["sound"] = _sound(sound)
-        parts.append(_element("clip", values))
-    # Nothing in it may end the element that it stands in.
-    text = json.dumps(table, separators=(",", ":")).replace("<", "\\u003c")
-    parts.insert(0, f'<script type="application/json" id="face-table">{text}</script>')
+    table, files = _content(dna, title, looks, clip, sound)
+    text = _json(table)
+    parts = [f'<script type="application/json" id="face-table">{text}</script>']
+    kind = 'type="application/octet-stream"'
+    parts += [f'<script {kind} id="{name}">{data}</script>' for name, data in files.items()]
     page = page.replace("<title>Risorius</title>", f"<title>{html.escape(title)}</title>", 1)
     return page.replace(_MARK, "\n".join(parts), 1).encode()
 
 
-def _element(name: str, data: bytes) -> str:
-    packed = base64.b64encode(gzip.compress(data, 6, mtime=0)).decode()
-    kind = 'type="application/octet-stream" data-packed="gzip"'
-    return f'<script {kind} id="{name}">{packed}</script>'
+def render_script(
+    dna: Dna,
+    name: str,
+    *,
+    looks: Looks | None = None,
+    clip: Clip | None = None,
+    sound: Sound | None = None,
+) -> bytes:
+    """A script with the face and the viewer in it, for pages of the user's own.
+
+    `<script src="face.js"></script>` and `<risorius-face></risorius-face>` show it.
+
+    Args:
+        dna, looks, clip, sound: see render.
+        name: by which `<risorius-face name="...">` finds it; the first face needs none.
+
+    Returns:
+        JavaScript in ASCII.
+
+    Raises:
+        WebError: see render.
+    """
+    page = empty_page()
+    viewer, boot = dict(_ELEMENT.findall(page)), _BOOT.search(page)
+    if boot is None or "viewer" not in viewer:
+        raise WebError("this build's web page is of an older make: packaging/ship/web.sh renews it")
+    table, files = _content(dna, name, looks, clip, sound)
+    face = f'{{"table":{_json(table)},"files":{_json({**files, **viewer})}}}'
+    return (
+        "// Made by Risorius (MIT), with three.js (MIT).\n"
+        f"((globalThis.risoriusFaces ??= {{}})[{_json(name)}] = {face});\n{boot[1]}\n"
+    ).encode("ascii")
+
+
+def _json(value: Any) -> str:
+    """Nothing in it may end the element that it stands in."""
+    return json.dumps(value, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _content(
+    dna: Dna, title: str, looks: Looks | None, clip: Clip | None, sound: Sound | None
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """The table, and the files by name, each packed and as text."""
+    if not any(len(mesh.positions) for mesh in dna.meshes):
+        raise WebError("the file has no meshes: there is nothing to show")
+    looks = looks or find_looks(dna)
+    names = list(dna.raw_control_names)
+    packed = pack(dna)
+    for mesh in packed.about:
+        mesh["material"] = looks.of_mesh[dna.mesh_names[mesh["index"]]]
+    table: dict[str, Any] = {
+        "title": title,
+        "regions": _regions(names),
+        "meshes": packed.about,
+        "materials": looks.materials,
+        "pictures": [[media, len(data)] for media, data in looks.pictures],
+        "captures": _captures(names),
+        "bones": _bones(dna),
+        "clip": None,
+    }
+    files = {"face": _packed(_rig(dna)), "geometry": _packed(packed.data)}
+    if looks.pictures:
+        files["pictures"] = _packed(b"".join(data for _, data in looks.pictures), 0)
+    if clip is not None:
+        table["clip"], values = _clip(clip, names, dna)
+        table["clip"]["sound"] = _sound(sound)
+        files["clip"] = _packed(values)
+    return table, files
+
+
+def _rig(dna: Dna) -> bytes:
+    """What evaluates: the file without its meshes."""
+    return load(dna.to_bytes(), layers=RIG).to_bytes()
+
+
+def _packed(data: bytes, level: int = 9) -> str:
+    return base64.b64encode(gzip.compress(data, level, mtime=0)).decode()
+
+
+def _captures(names: list[str]) -> dict[str, Any]:
+    """How the page maps the curves of a table that is dropped on it: rows by curve, a raw control
+    by number or an angle by name; and the controls that are shares of another."""
+    mapping = load_mapping(_CAPTURES)
+    index = {short_name(name): i for i, name in enumerate(names)}
+    index |= {name: i for i, name in enumerate(names)}
+
+    def place(control: str) -> int | str | None:
+        if control in (angle for angles in ANGLES.values() for angle in angles):
+            return control
+        return index.get(control, index.get(short_name(control)))
+
+    rows = {
+        curve: [[place(c), weight] for c, weight in row.items() if place(c) is not None]
+        for curve, row in mapping.rows.items()
+    }
+    shares = [[place(c), place(whole)] for c, whole in mapping.shares.items()]
+    return {
+        "rows": {curve: row for curve, row in rows.items() if row},
+        "shares": [pair for pair in shares if None not in pair],
+    }
+
+
+def _bones(dna: Dna) -> list[dict[str, Any]]:
+    """The joints that turn as neck and head: their share of the angles, their axes, and the raw
+    controls that hold their rotation."""
+    controls = {item.joint: item for item in joint_controls(dna)[0]}
+    return [
+        {
+            "joint": joint,
+            "bone": bone,
+            "share": share,
+            "axes": np.asarray(turn_axes(dna, joint), float).ravel().tolist(),
+            "controls": list(controls[joint].controls) if joint in controls else [],
+        }
+        for joint, (bone, share) in turned_joints(dna.joint_names).items()
+    ]
 
 
 def _regions(names: list[str]) -> list[dict[str, Any]]:

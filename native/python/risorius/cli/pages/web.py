@@ -12,7 +12,7 @@ from ...baking.clips import load_performance
 from ...baking.face import load_face, prepared
 from ...base.given import GivenError, shown, whole_text
 from ...files import fileio
-from ...web import find_pictures, render
+from ...web import find_looks, render, render_script
 from ...web.page import SOUNDS, empty_page
 from ..files import CommandLineError, InputError, read_bytes, require_suffix, require_writable
 
@@ -25,7 +25,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "levels of detail and a clip, evaluated by the library itself.",
     )
     parser.add_argument("file", type=Path, help="the DNA file; textures beside it come along")
-    parser.add_argument("-o", "--out", type=Path, metavar="PAGE.html", help="else FILE.html")
+    parser.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        metavar="PAGE.html",
+        help="else FILE.html; FACE.js: a script that shows <risorius-face> on a page of your own",
+    )
     parser.add_argument(
         "--clip", type=Path, metavar="TAKE", help="animation that plays: .rzc, or what eval reads"
     )
@@ -58,7 +64,7 @@ def _lods(text: str | None) -> tuple[int, int] | None:
 
 def run(args: argparse.Namespace) -> int:
     out = args.out or args.file.with_suffix(".html")
-    require_suffix(out, (".html", ".htm"), "-o")
+    require_suffix(out, (".html", ".htm", ".js"), "-o")
     require_writable(out)
     if args.sound is not None:
         if args.clip is None:
@@ -76,9 +82,12 @@ def run(args: argparse.Namespace) -> int:
     if args.sound is not None:
         sound = (read_bytes(str(args.sound)), args.sound.suffix, 0.0)
     title = args.title or dna.name or args.file.stem
-    pictures = find_pictures(dna, args.file)
+    looks = find_looks(dna, args.file)
     try:
-        page = render(dna, title, pictures=pictures, clip=clip, sound=sound)
+        if out.suffix.lower() == ".js":
+            page = render_script(dna, out.stem, looks=looks, clip=clip, sound=sound)
+        else:
+            page = render(dna, title, looks=looks, clip=clip, sound=sound)
     except risorius.RisoriusError as error:
         raise InputError(f"{args.file}: {error}") from error
     fileio.write_bytes(out, page)

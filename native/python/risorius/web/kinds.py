@@ -1,0 +1,29 @@
+# SPDX-License-Identifier: MIT
+"""What a mesh is of a person, read from its name."""
+
+from __future__ import annotations
+
+# The first that fits counts: an eyelash is no eye.
+_KINDS = (
+    ("lashes", ("lash", "eyebrow")),
+    ("hair", ("hair", "brow", "beard", "moustache", "mustache", "sideburn", "ponytail", "stubble")),
+    ("wet", ("eyeshell", "eyeedge", "eye_edge", "saliva", "tear", "fluid", "cornea", "occlusion")),
+    ("gum", ("cartilage", "caruncle", "gum")),
+    ("eyes", ("eye", "iris", "sclera")),
+    ("teeth", ("teeth", "tooth", "denture")),
+    ("tongue", ("tongue",)),
+    (
+        "cloth",
+        ("shirt", "cloth", "garment", "outfit", "jacket", "dress", "collar", "scarf", "sweater"),
+    ),
+)
+
+
+def kind_of(name: str) -> str:
+    """skin, eyes, teeth, tongue, lashes, hair, wet, gum or cloth.
+
+    Args:
+        name: of a mesh.
+    """
+    word = name.lower()
+    return next((kind for kind, parts in _KINDS if any(p in word for p in parts)), "skin")

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""How the meshes of a page look: the textures that a DNA file names in its metadata, small enough
+for a network, and where wrinkles show."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .._native import Dna
+from ..files.jpeg import jpeg
+from ..files.names import is_file_name
+from ..files.png import has_opacity, read_pixels
+from .kinds import kind_of
+
+Pixels = npt.NDArray[np.uint8]
+
+_KINDS = {
+    b"\x89PNG\r\n\x1a\n": "image/png",
+    b"\xff\xd8\xff": "image/jpeg",
+    b"RIFF": "image/webp",
+}
+_JPEG = "image/jpeg"
+_MOST = 16 << 20  # bytes of one picture
+# Role -> longest side, quality. Wrinkles are soft, and hair has one colour for the most part.
+_SIZES = {
+    "color": (1024, 82),
+    "hair": (512, 75),
+    "alpha": (1024, 72),
+    "normal": (1024, 87),
+    "roughness": (512, 75),
+    "wrinkles": (512, 84),
+    "masks": (1024, 80),
+}
+_ROLES = ("color", "alpha", "normal", "roughness")
+_LOD = re.compile(r"_lod\d+.*", re.IGNORECASE)
+_REGION = re.compile(r"head_wm([123])_(?!normal)[A-Za-z]+(?:_[A-Za-z]{1,2})?$")
+_TILE = 128  # pixels: masks are soft, and the page has all in one picture
+_FLUSH = 3  # the channel behind the three sets of wrinkles
+# Sets of newer exports hold differences about 0.5: of theirs blue is as grey as red.
+_OFFSET_BLUE = 0.75
+
+
+@dataclass
+class Looks:
+    """What the page knows of its surfaces.
+
+    Attributes:
+        materials: kind, and the numbers of pictures by use.
+        of_mesh: mesh -> number of its material.
+        pictures: media type and bytes.
+    """
+
+    materials: list[dict[str, Any]] = field(default_factory=list)
+    of_mesh: dict[str, int] = field(default_factory=dict)
+    pictures: list[tuple[str, bytes]] = field(default_factory=list)
+
+
+def find_looks(dna: Dna, file: Path | None = None) -> Looks:
+    """A material for each mesh, those of one name at all levels the same.
+
+    Args:
+        dna: has the metadata: `texture:<mesh>:<role>` names a file.
+        file: the DNA file; pictures lie beside it or in <stem>_textures. None: there are none.
+
+    Returns:
+        Pictures that are there; what a browser cannot show is left out.
+    """
+    return _Finder(dna, file).looks()
+
+
+class _Finder:
+    def __init__(self, dna: Dna, file: Path | None) -> None:
+        self.dna = dna
+        self.folders = (
+            () if file is None else (file.with_name(f"{file.stem}_textures"), file.parent)
+        )
+        self.out = Looks()
+        self.numbers: dict[tuple[str, str], dict[str, int]] = {}
+        self.named: dict[str, dict[str, str]] = {}
+        for key, name in dna.metadata.items():
+            words = key.split(":", 2)
+            if len(words) == 3 and words[0] == "texture":
+                self.named.setdefault(_base(words[1]), {}).setdefault(words[2], name)
+
+    def looks(self) -> Looks:
+        bases: dict[str, int] = {}
+        for mesh in self.dna.mesh_names:
+            base = _base(mesh)
+            if base not in bases:
+                bases[base] = len(self.out.materials)
+                self.out.materials.append(self._material(base, kind_of(mesh)))
+            self.out.of_mesh[mesh] = bases[base]
+        return self.out
+
+    def _material(self, base: str, kind: str) -> dict[str, Any]:
+        material: dict[str, Any] = {"kind": kind}
+        named = self.named.get(base, {})
+        for role in _ROLES:
+            if role in named and (role in ("color", "alpha") or kind == "skin"):
+                material.update(self._picture(named[role], role, kind))
+        if kind == "skin":
+            wrinkles = self._wrinkles(named)
+            if wrinkles["maps"]:
+                material["wrinkles"] = wrinkles
+        return material
+
+    def _picture(self, name: str, role: str, kind: str = "") -> dict[str, int]:
+        """Role -> number of a picture; two where a colour has its opacity with it."""
+        if (name, role) in self.numbers:
+            return self.numbers[name, role]
+        data = self._read(name)
+        found: dict[str, int] = {}
+        if data:
+            pixels = read_pixels(data, opacity=True)
+            if pixels is None:
+                found[role] = self._add(_media(data), data)
+                if has_opacity(data) and kind in ("hair", "lashes"):
+                    found["cut"] = 1  # by the opacity of the colour itself
+            elif pixels.ndim == 3 and pixels.shape[2] == 4:
+                found["color"] = self._compress(pixels[..., :3], "hair")
+                found["alpha"] = self._compress(pixels[..., 3], "alpha")
+            else:
+                found[role] = self._compress(pixels, role.partition(":")[0])
+        self.numbers[name, role] = found
+        return found
+
+    def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
+        """Sets of normals, one picture of all masks, and which map shows where in it."""
+        sets, offsets, maps = dict[int, int](), list[int](), list[list[int]]()
+        tiles = list[Pixels]()
+        for number in (1, 2, 3):
+            pixels = self._pixels(named.get(f"normal:{number}", ""))
+            if pixels is not None and pixels.ndim == 3:
+                if pixels[..., 2].mean() < 255 * _OFFSET_BLUE:
+                    offsets.append(number)
+                sets[number] = self._compress(pixels, "wrinkles")
+        for index, label in enumerate(self.dna.animated_map_names):
+            region = _REGION.search(label)
+            own = named.get(f"map:{label}", "")
+            channel = int(region[1]) - 1 if region else _FLUSH
+            if not own and (region is None or channel + 1 not in sets):
+                continue
+            mask = self._pixels(own or f"{region[0] if region else ''}_msk.png")
+            if mask is not None and mask.ndim == 2:
+                maps.append([index, len(tiles), _FLUSH if own else channel])
+                tiles.append(_squared(mask))
+        if not tiles:
+            return {"maps": []}
+        side = int(np.ceil(np.sqrt(len(tiles))))
+        atlas = np.zeros((side * _TILE, side * _TILE), np.uint8)
+        for i, tile in enumerate(tiles):
+            row, column = i // side * _TILE, i % side * _TILE
+            atlas[row : row + _TILE, column : column + _TILE] = tile
+        masks = self._compress(atlas, "masks")
+        return {"sets": sets, "offsets": offsets, "masks": masks, "side": side, "maps": maps}
+
+    def _compress(self, pixels: Pixels, role: str) -> int:
+        longest, quality = _SIZES.get(role, _SIZES["color"])
+        fine = role in ("normal", "wrinkles")
+        return self._add(_JPEG, jpeg(_halved(pixels, longest), quality, fine_color=fine))
+
+    def _add(self, media: str, data: bytes) -> int:
+        self.out.pictures.append((media, data))
+        return len(self.out.pictures) - 1
+
+    def _pixels(self, name: str) -> Pixels | None:
+        data = self._read(name)
+        return read_pixels(data) if data else None
+
+    def _read(self, name: str) -> bytes:
+        """b"" where no such picture is there. Metadata may name no file elsewhere."""
+        if not is_file_name(name):
+            return b""
+        for folder in self.folders:
+            path = folder / name
+            if path.is_file() and path.stat().st_size <= _MOST:
+                data = path.read_bytes()
+                return data if _media(data) else b""
+        return b""
+
+
+def _base(mesh: str) -> str:
+    return _LOD.sub("", mesh)
+
+
+def _media(data: bytes) -> str:
+    return next((kind for start, kind in _KINDS.items() if data.startswith(start)), "")
+
+
+def _halved(pixels: Pixels, longest: int) -> Pixels:
+    """The mean of four in place of each four, until no side is longer."""
+    while max(pixels.shape[:2]) > longest and min(pixels.shape[:2]) > 1:
+        rows, columns = pixels.shape[0] // 2 * 2, pixels.shape[1] // 2 * 2
+        four = [pixels[i:rows:2, j:columns:2].astype(np.uint16) for i in (0, 1) for j in (0, 1)]
+        pixels = ((sum(four[1:], four[0]) + 2) // 4).astype(np.uint8)
+    return pixels
+
+
+def _squared(mask: Pixels) -> Pixels:
+    """uint8[_TILE, _TILE]: what is nearest in a mask of any size."""
+    small = _halved(mask, _TILE)
+    row, column = ((np.arange(_TILE) * size // _TILE).astype(np.int64) for size in small.shape)
+    return small[row[:, None], column[None, :]]
