@@ -293,6 +293,28 @@ def test_the_selected_meshes_and_those_of_their_armature_are_one_face(whole_head
     assert np.ptp(np.asarray(dna.meshes[0].positions)[:, 1]) == pytest.approx(20.0, abs=0.1)
 
 
+def test_a_packed_roughness_of_a_gltf_is_read_in_its_green(tmp_path):
+    from risorius.cli import main
+    from risorius.files.png import png
+
+    points, faces, shapes = likenesses.skull()
+    head = likenesses.mesh("Head", (points, faces), shapes, material=0)
+    rough = {"metallicRoughnessTexture": {"index": 0}}
+    materials = [{"name": "Skin", "pbrMetallicRoughness": rough}]
+    picture = png(np.full((4, 4, 3), [0.0, 0.8, 1.0]))
+    likenesses.save_glb(tmp_path / "h.glb", likenesses.placed([head]), materials, [picture])
+    (tmp_path / "h.toml").write_text(
+        '[source]\nneutral = "h.glb"\n[joints]\ncount = 2\nrounds = 1\n[lods]\ncount = 1\n'
+    )
+    assert main(["author", str(tmp_path / "h.toml"), "-o", str(tmp_path / "h.dna")]) == 0
+    rig = scene.load(tmp_path / "h.dna")
+    tree = scene.meshes(rig)[0].data.materials[0].node_tree
+    surface = next(n for n in tree.nodes if n.type == "BSDF_PRINCIPLED")
+    link = surface.inputs["Roughness"].links[0]
+    assert link.from_socket.name == "Green"
+    assert link.from_node.inputs[0].links[0].from_node.image.name.startswith("Skin_orm")
+
+
 def test_the_tab_offers_it_while_a_mesh_with_keys_is_selected(head, dna_file):
     panel = scene.submodule("ui.face.panel").RISORIUS_PT_character
     assert "risorius.make_rig" in drawn(panel).operators

@@ -347,7 +347,8 @@ class Skin:
         if picture is not None:
             color = graph.image(picture, label="Roughness").outputs["Color"]
             # glTF's pictures of this name have it in their green, metalness in their blue.
-            is_packed = look.found.of(look.base, "roughness").stem.endswith("_orm")
+            file = look.found.of(look.base, "roughness")
+            is_packed = file is not None and file.stem.endswith("_orm")
             return graph.split_color(color)[1] if is_packed else color
         uneven = graph.noise(self.points, 7.0 / look.unit, detail=4.0)
         rough = graph.math("MULTIPLY_ADD", uneven, 0.22, 0.40)
