@@ -105,7 +105,7 @@ async def _eye(one: Browser, page: Path, how: str) -> str:
     """A white ball has few colours and nothing dark in its middle."""
     await one.open(page, 400 + 350, 400)
     colors, dark = await one.evaluate(EYE)
-    if colors < 40 or not 0.01 < dark < 0.6:
+    if colors < 40 or not 0.01 < dark < 0.2:
         raise RuntimeError(f"an eye {how}: {colors} colours, {dark:.0%} of it dark: no iris")
     return f"an eye {how}: {colors} colours, {dark:.0%} of its middle dark"
 
