@@ -19,7 +19,7 @@ from ..fitting import FitOptions
 from ..geometry.skeleton import Doubles
 from ..levels import LodOptions
 from ..work import RigOptions
-from . import fbx, gltf
+from . import fbx, gltf, said
 from .matching import Assignment, assign
 from .obj import ShapeFileError, read_obj, read_positions
 from .shape_face import ShapeSet, check_shapes, combined_rows, make_shape_face, take_combined
@@ -69,7 +69,7 @@ class Spec:
     source: dict[str, Any]
     options: RigOptions
     correctives: CorrectiveOptions = field(default_factory=lambda: CorrectiveOptions(most=0))
-    controls: dict[str, str | list[str]] = field(default_factory=dict)
+    controls: dict[str, said.Said] = field(default_factory=dict)
 
 
 def read_spec(path: Path) -> Spec:
@@ -123,10 +123,6 @@ def _read_tables(path: Path) -> dict[str, Any]:
     return {name: _checked(path, name, found) for name, found in table.items()}
 
 
-def _one_or_several(value: object) -> str | list[str]:
-    return list(_names(value)) if isinstance(value, list) else text(value)
-
-
 def _checked(path: Path, name: str, found: object) -> Any:
     """The value of a key of the file's top. Raises: ShapeFileError: none that is known."""
     place = name
@@ -140,7 +136,7 @@ def _checked(path: Path, name: str, found: object) -> Any:
         out = {}
         for key, value in found.items():
             place = f"{name}.{key}"
-            check = _one_or_several if name == "controls" else _TABLES[name].get(key)
+            check = said.check if name == said.TABLE else _TABLES[name].get(key)
             if check is None:
                 raise GivenError(f"one of {', '.join(_TABLES[name])} was expected")
             out[key] = check(value)
