@@ -33,7 +33,7 @@ PROPERTIES = {
     "mesh": """risorius_rig dna_mesh dna_lods risorius_mode risorius_hide_viewport
         risorius_user_hide_viewport risorius_strands""",
     "key": "risorius_real risorius_key_names risorius_key_order risorius_opened risorius_before",
-    "mesh data": "risorius_heat_before risorius_heat",
+    "mesh data": "risorius_heat_before risorius_heat risorius_names",
     "joint": "dna_joint",
     "control bone": "risorius_part risorius_board",
     "slider": "CTRL_expressions.jawOpen",

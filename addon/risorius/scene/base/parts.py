@@ -32,6 +32,7 @@ LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: its number in the DNA
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
+NAMES = "risorius_names"  # on a Mesh: what the user says of its shape keys, see assigned.py
 REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys
 KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: their order, as channels

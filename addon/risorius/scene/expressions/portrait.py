@@ -27,6 +27,7 @@ _KEY = np.array([-0.45, 0.55, 0.70])  # light from the upper left
 _FILL = np.array([0.75, 0.05, 0.65])
 _TOP = np.array([0.42, 0.42, 0.43])  # behind the face
 _BOTTOM = np.array([0.27, 0.27, 0.28])
+_STILL_GLOSS = 0.07  # of a mesh that is no character's
 _FAR = 15.0  # where one looks from, in distances between the eyes
 
 
@@ -120,7 +121,34 @@ def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floa
     picture = _Picture(high)
     for piece in sorted(sitter.pieces, key=lambda one: one.hairs):
         points = _posed(live, piece, moves, pose.blend_shapes)
-        picture.add(piece, _on_screen(live, points, view, scale, high))
+        picture.add(piece, _on_screen(live.space.points(points), view, scale, high))
+    return _averaged(picture.lit(), _SMOOTH)
+
+
+def draw_still(
+    points: Floats,
+    triangles: Ints,
+    colors: Floats,
+    frame: tuple[Floats, float],
+    size: int = SIZE,
+) -> Floats:
+    """A mesh that is no character's, seen from the front.
+
+    Args:
+        points: float64[V, 3] in Blender's axes; the face looks along -y.
+        triangles: int64[F, 3].
+        colors: float64[F, 3] in [0, 1].
+        frame: the middle of the picture, and half its height.
+        size: pixels each way.
+
+    Returns:
+        As draw.
+    """
+    high = size * _SMOOTH
+    uvs, none = np.zeros((*triangles.shape, 2)), np.zeros((len(points), 0), np.float32)
+    piece = Piece(0, triangles, uvs, colors, None, _STILL_GLOSS, False, none, ())
+    picture = _Picture(high)
+    picture.add(piece, _on_screen(points, *frame, high))
     return _averaged(picture.lit(), _SMOOTH)
 
 
@@ -167,11 +195,9 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
     return (low + high) / 2, 1.05 * half
 
 
-def _on_screen(
-    live: runtime.Runtime, points: Floats, middle: Floats, half: float, high: int
-) -> Floats:
+def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats:
     """Pixels to the right and down, and towards who looks; a little nearer is a little larger."""
-    seen = (live.space.points(points) - middle)[:, [0, 2, 1]] / half
+    seen = (points - middle)[:, [0, 2, 1]] / half
     seen[:, 2] *= -1.0  # the face looks along -y
     seen[:, :2] *= (_FAR / (_FAR - seen[:, 2]).clip(1.0))[:, None]
     screen = seen * (high / 2)

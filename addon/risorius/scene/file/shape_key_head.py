@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import cast
 
@@ -91,7 +91,12 @@ def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int
 
 
 def rig_task(
-    shapes: native.ShapeSet, path: str, joints: int, levels: int, tolerance_mm: float | None
+    shapes: native.ShapeSet,
+    path: str,
+    joints: int,
+    levels: int,
+    tolerance_mm: float | None,
+    said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[tuple[native.JointRig, list[str]]]:
     """The making of a joint rig, which ends with the file; a cancelled one leaves none.
 
@@ -101,6 +106,7 @@ def rig_task(
         joints: new ones.
         levels: of detail.
         tolerance_mm: what blend shapes keep; None: joints alone.
+        said: what the user said that keys are, as risorius.author.input.said.
 
     Returns:
         A task whose result is risorius.author.JointRig and what is odd, a sentence each.
@@ -113,7 +119,7 @@ def rig_task(
         progress: Callable[[float], None], cancelled: Callable[[], bool]
     ) -> tuple[native.JointRig, list[str]]:
         odd = face.check_shapes(shapes)
-        became = matching.assign(shapes.expressions, {})
+        became = matching.assign(shapes.expressions, said or {})
         odd += became.notes
         dna = face.make_shape_face(shapes, became.controls)
         options = author.RigOptions(

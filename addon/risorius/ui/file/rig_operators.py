@@ -13,6 +13,7 @@ from ...scene.base.blender_types import MeshObject
 from ...scene.character import build, rig_placement
 from ...scene.file import shape_key_head
 from ...scene.frame import evaluate
+from ...scene.shape_keys import assigned
 from .. import words
 from ..background_work import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
@@ -78,7 +79,10 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
             return {"CANCELLED"}
         self._head = item.name
         tolerance = self.tolerance if self.use_shapes else None
-        task = shape_key_head.rig_task(shapes, self.filepath, self.joints, self.levels, tolerance)
+        said = assigned.said_of(item)
+        task = shape_key_head.rig_task(
+            shapes, self.filepath, self.joints, self.levels, tolerance, said
+        )
         self._task = task
         return self.begin(context, task)
 

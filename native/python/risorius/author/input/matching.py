@@ -199,6 +199,11 @@ def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
     return []
 
 
+def own_control(name: str) -> str:
+    """The control that a shape is where it is one of its own and no other has its name."""
+    return _own(name, "", ())
+
+
 def _own(name: str, expression: str, taken: Container[str]) -> str:
     """A control's name in letters that every reader of DNA files takes."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
