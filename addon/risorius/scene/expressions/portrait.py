@@ -7,7 +7,7 @@ user's scene is never touched for them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,17 +111,36 @@ def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floa
     Returns:
         float64[size, size, 3] in [0, 1], row 0 at the bottom.
     """
+    return draw_places(sitter, places(sitter, sliders), size)
+
+
+def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
+    """Where the vertices of each piece are: float64[V, 3] in file space.
+
+    Args:
+        sitter, sliders: as of draw.
+    """
     live = sitter.live
     rests = dict(zip(live.labels, live.rests, strict=True))
     raw = np.array([sliders.get(name, rests[name]) for name in live.labels], np.float32)
     pose = live.rig.evaluate(raw)
     moves = _moves(live, np.asarray(pose.joints, np.float64))
+    return [_posed(live, piece, moves, pose.blend_shapes) for piece in sitter.pieces]
+
+
+def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> Floats:
+    """The face with its vertices at these places, as draw.
+
+    Args:
+        sitter, size: as of draw.
+        placed: of `places`.
+    """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
     picture = _Picture(high)
-    for piece in sorted(sitter.pieces, key=lambda one: one.hairs):
-        points = _posed(live, piece, moves, pose.blend_shapes)
-        picture.add(piece, _on_screen(live.space.points(points), view, scale, high))
+    pairs = zip(sitter.pieces, placed, strict=True)
+    for piece, points in sorted(pairs, key=lambda pair: pair[0].hairs):
+        picture.add(piece, _on_screen(sitter.live.space.points(points), view, scale, high))
     return _averaged(picture.lit(), _SMOOTH)
 
 

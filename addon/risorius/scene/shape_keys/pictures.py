@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,10 +27,12 @@ from . import assigned
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-VERSION = 1  # of the look: pictures of another one are made anew
+VERSION = 2  # of the look: pictures of another one are made anew
 _SKIN = np.array([0.62, 0.60, 0.58])
+_CLAY = 0.82  # of the sample man's colours, which have no paint
 _MOVED = np.array([0.95, 0.45, 0.10])
 _STRONG = 0.8  # of the colour of what moves furthest
+_FAINT = 0.15  # of it: what would have less has none
 _MOVES = 0.12  # of the furthest way: what moves less is not framed
 _MARGIN = 1.35  # around what moves
 _LEAST = 0.3  # of the mesh: half the height of a picture at least
@@ -173,10 +175,24 @@ def draw(model: Model, key: str) -> Floats:
     """
     way = model.ways[key].astype(np.float64)
     length = np.linalg.norm(way, axis=1)
-    share = np.sqrt(length / max(float(length.max(initial=0.0)), 1e-12))
-    share = np.where(share > 0.15, share, 0.0)[model.triangles].mean(axis=1)[:, None] * _STRONG
-    colors = _SKIN + share * (_MOVED - _SKIN)
+    skin = np.tile(_SKIN, (len(model.triangles), 1))
+    colors = _marked(skin, length, model.triangles, float(length.max(initial=0.0)))
     return portrait.draw_still(model.points + way, model.triangles, colors, model.frame)
+
+
+def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) -> Floats:
+    """Colours of triangles, those of what moves turned to orange.
+
+    Args:
+        colors: float64[F, 3].
+        length: float64[V], how far each vertex goes.
+        triangles: int64[F, 3].
+        furthest: how far that goes which has the full colour.
+    """
+    share = np.sqrt(length / max(furthest, 1e-12))
+    share = np.where(share > _FAINT, share, 0.0)[triangles].mean(axis=1)[:, None] * _STRONG
+    marked: Floats = colors + share * (_MOVED - colors)
+    return marked
 
 
 def sample_path(value: str) -> Path:
@@ -186,6 +202,18 @@ def sample_path(value: str) -> Path:
     return _file(_digest(text.encode()))
 
 
+def without_picture(values: Sequence[str]) -> list[str]:
+    """Of what keys may be those whose picture is not there, each picture once.
+
+    Args:
+        values: as assigned.Choice says them.
+    """
+    found = {
+        path: value for value in reversed(values) if not (path := sample_path(value)).is_file()
+    }
+    return list(reversed(found.values()))
+
+
 def sample_sitter() -> portrait.Sitter | None:
     """The sample man, in plain clay; None where he did not come with the add-on."""
     path = native.bundled_sample(_SAMPLE)
@@ -193,6 +221,18 @@ def sample_sitter() -> portrait.Sitter | None:
         return None
     live = runtime.compiled(path.read_bytes())
     return portrait.Sitter(live, tuple(thumbnails.plain_pieces(live)))
+
+
+def _draw_sample(sitter: portrait.Sitter, rest: Sequence[Floats], value: str) -> Floats:
+    """The sample man as what a key may be. Args: rest  portrait.places of no sliders."""
+    placed = portrait.places(sitter, assigned.weights_of(value))
+    lengths = [np.linalg.norm(a - b, axis=1) for a, b in zip(placed, rest, strict=True)]
+    furthest = max(float(length.max(initial=0.0)) for length in lengths)
+    pieces = tuple(
+        replace(piece, colors=_marked(_CLAY * piece.colors, length, piece.triangles, furthest))
+        for piece, length in zip(sitter.pieces, lengths, strict=True)
+    )
+    return portrait.draw_places(replace(sitter, pieces=pieces), placed)
 
 
 def make(
@@ -223,10 +263,11 @@ def make(
         done += 1
         progress(done / count)
     sitter = sample_sitter() if samples else None
+    rest = portrait.places(sitter, {}) if sitter is not None else []
     for value in samples:
         if sitter is None or cancelled():
             return done
-        write(sample_path(value), png(portrait.draw(sitter, assigned.weights_of(value))))
+        write(sample_path(value), png(_draw_sample(sitter, rest, value)))
         done += 1
         progress(done / count)
     return done

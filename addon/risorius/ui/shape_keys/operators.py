@@ -135,7 +135,7 @@ def _fill() -> None:
             choice.value,
             shown.label_of_choice(choice),
             shown.tooltip_of_choice(choice),
-            previews.icon_of(pictures.sample_path(choice.value)),
+            previews.load(pictures.sample_path(choice.value)),
             number,
         )
         for number, choice in enumerate(assigned.choices())
@@ -250,9 +250,15 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
     again: bpy.props.BoolProperty(
         name="All Anew", description="Also pictures that are there", options={"SKIP_SAVE"}
     )
+    use_choices: bpy.props.BoolProperty(
+        name="What Can Be Chosen",
+        description="Also what no key here is, for the list of Choose",
+        options={"SKIP_SAVE"},
+    )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self.wait_beside()
+        self.use_choices = True  # drawn once for all heads, and last
         return self.execute(context)
 
     def execute(self, context: Context) -> Result:
@@ -260,8 +266,10 @@ class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
         model, rows = pictures.model_of(item), assigned.of(item).rows
         first = sorted(rows.values(), key=lambda row: row.is_known)
         keys = [r.key for r in first if self.again or not model.paths[r.key].is_file()]
-        meant = dict.fromkeys(v for v in map(shown.sample_of, first) if v)
-        samples = [v for v in meant if not pictures.sample_path(v).is_file()]
+        meant = [value for value in map(shown.sample_of, first) if value]
+        if self.use_choices:
+            meant += [c.value for c in assigned.choices() if c.kind != assigned.CONTROL]
+        samples = pictures.without_picture(meant)
         self._count, self._redrawn = len(keys) + len(samples), 0
         job = pictures.Job(model, keys, samples)
         return self.begin(

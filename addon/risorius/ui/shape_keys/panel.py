@@ -17,7 +17,7 @@ from ...scene.base.blender_types import MeshObject, current_context
 from ...scene.file import shape_key_head
 from ...scene.shape_keys import assigned, pictures
 from .. import words
-from ..blender_types import Context, Panel, UILayout, UIList
+from ..blender_types import Context, Icon, Panel, UILayout, UIList
 from ..common import FacePanel
 from ..expressions import previews
 from . import shown
@@ -62,10 +62,11 @@ class RISORIUS_UL_shape_key_names(UIList):
         # Blender's list takes clicks on its first line alone.
         below.alignment = "LEFT"
         is_open = not row.is_known and not row.is_said
-        below.alert, below.active = is_open, is_open or row.is_said
+        below.active = is_open or row.is_said
         text = words.say("Unknown") if is_open else shown.becomes(row)
+        mark: Icon = "QUESTION" if is_open else "ERROR" if row.holder else "NONE"
         button = below.operator(
-            "risorius.select_shape_key", text=text, emboss=False, translate=False
+            "risorius.select_shape_key", text=text, icon=mark, emboss=False, translate=False
         )
         button.key = item.name
 
