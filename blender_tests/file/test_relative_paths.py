@@ -53,6 +53,7 @@ def _calls(folder):
         "save_range": [({"filepath": "//saved.toml"}, "saved.toml")],
         "load_shape_key_names": [({"filepath": "//names.toml"}, "")],
         "save_shape_key_names": [({"filepath": "//kept.toml"}, "kept.toml")],
+        "save_curve_mapping": [({"filepath": "//map.toml", "use_import": False}, "map.toml")],
         "speak": {"filepath": "//voice.wav"},
     }
 
@@ -107,6 +108,8 @@ def test_two_slashes_begin_at_the_blend_in_every_operator(dna_file, tmp_path, mo
     }
     monkeypatch.setattr(scene.submodule("scene.export.web_page"), "page", lambda *_given: b"a page")
     heard = _deaf(monkeypatch)
+    curves = scene.submodule("scene.shape_keys.unknown_curves")
+    curves.keep(scene.controls(rig), curves.Unknown("arkit", {}, ["Key 1"]))
     bpy.context.view_layer.objects.active = scene.controls(rig)
     with pytest.raises(RuntimeError, match=r"voice.wav: nobody speaks"):
         run.speak(**table.pop("speak"))

@@ -20,7 +20,13 @@ ELSEWHERE = {
     *("forget_range", "load_range", "save_range", "add_character", "set_lod"),
     *("set_lod_by_distance", "set_shape_mode", "set_strands", "reset_board", "select_board"),
     *("assign_shape_key", "choose_shape_key", "select_shape_key", "shape_key_pictures"),
-    *("load_shape_key_names", "save_shape_key_names"),
+    *(
+        "assign_curve",
+        "choose_curve",
+        "save_curve_mapping",
+        "load_shape_key_names",
+        "save_shape_key_names",
+    ),
     *("lead", "remove_board", "frame_board", "sound_set", "sound_insert", "sound_remove"),
 }
 

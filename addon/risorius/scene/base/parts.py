@@ -23,6 +23,7 @@ SOURCE = "risorius_source"  # on the deforming armature: the path it came from
 TEXTURES = "risorius_textures"  # on the deforming armature: words on which textures were found
 OVERDRIVE = "risorius_overdrive"  # on the control armature: hard maximum is 1.5
 RANGES = "risorius_ranges"  # on the control armature: capture range, see range_properties.py
+CURVES = "risorius_curves"  # on the control armature: unknown curves, see unknown_curves.py
 BODY_NECK = "risorius_body_neck"  # on the control armature: bones of the body, a line each
 BODY_HEAD = "risorius_body_head"  # the same for the head
 MESH_PREFIX = "risorius_mesh_"  # + number, on the deforming armature: a mesh

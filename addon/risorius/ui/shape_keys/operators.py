@@ -122,13 +122,17 @@ class RISORIUS_OT_assign_shape_key(Says, Operator):
         return self.keep(context, self.becomes)
 
 
-def _choices(_self: object, _context: object) -> Any:  # noqa: ANN401  stubs know no icon by number
+def _listed(_self: object, _context: object) -> Any:  # noqa: ANN401  stubs know no icon by number
     if not _items:
-        _fill()
+        fill_choices()
     return _items
 
 
-def _fill() -> None:
+# Blender takes an icon's number in an item too, which its stubs do not know.
+choice_items = _listed
+
+
+def fill_choices() -> None:
     """What can be chosen, with the pictures that are there by now."""
     _items[:] = [
         (
@@ -149,10 +153,10 @@ class RISORIUS_OT_choose_shape_key(Says, Operator):
     bl_label = "Choose a Control or Expression"
     bl_property = "choice"
 
-    choice: bpy.props.EnumProperty(name="Becomes", items=_choices, options={"SKIP_SAVE"})
+    choice: bpy.props.EnumProperty(name="Becomes", items=choice_items, options={"SKIP_SAVE"})
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
-        _fill()
+        fill_choices()
         context.window_manager.invoke_search_popup(cast(Any, self))
         return {"FINISHED"}
 

@@ -78,6 +78,14 @@ def words_of_controls(controls: tuple[str, ...]) -> str:
     return words.say("{name} and {count} more", name=first, count=len(controls) - 1)
 
 
+def words_of_value(value: str) -> str:
+    """What was chosen, in a few words. Args: value  of an assigned.Choice, "" for left out."""
+    if not value:
+        return words.say("Left out")
+    choice = next((c for c in assigned.choices() if c.value == value), None)
+    return label_of_choice(choice) if choice is not None else value
+
+
 def value_of(row: assigned.Row) -> assigned.Said:
     """What a key becomes, as a file of names says it. Args: row  of assigned.of."""
     if row.expression:
