@@ -33,8 +33,9 @@ _CLAY = 0.82  # of the sample man's colours, which have no paint
 _MOVED = np.array([0.95, 0.45, 0.10])
 _STRONG = 0.8  # of the colour of what moves furthest
 _FAINT = 0.15  # of it: what would have less has none
-_MOVES = 0.12  # of the furthest way: what moves less is not framed
-_MARGIN = 1.35  # around what moves
+_MOVES = 0.5  # of a key's furthest way: what moves less is not framed
+_NOTHING = 0.01  # of the furthest way of all keys
+_MARGIN = 1.25  # around what moves
 _LEAST = 0.3  # of the mesh: half the height of a picture at least
 _SAMPLE = "man"
 
@@ -109,7 +110,7 @@ def model_of(item: MeshObject) -> Model:
     triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     corners = triangles.reshape(-1, 3).astype(np.int64)
-    far = _furthest(ways, len(rest))
+    far = _shares(ways, len(rest))
     front = _to_front(rest, far)
     rest = rest @ front.T
     ways = {name: (way @ front.T).astype(np.float32) for name, way in ways.items()}
@@ -129,12 +130,16 @@ def _digest(*parts_of_it: bytes) -> str:
     return hashlib.sha1(b"".join(parts_of_it), usedforsecurity=False).hexdigest()
 
 
-def _furthest(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
-    """float64[V]: how far each vertex goes at most."""
-    far = np.zeros(count)
-    for way in ways.values():
-        np.maximum(far, np.linalg.norm(way, axis=1), out=far)
-    return np.nan_to_num(far, posinf=0.0)
+def _shares(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
+    """float64[V]: how far each vertex goes at most, as a share of what goes furthest by that key:
+    a brow counts as much as a jaw. Keys that move next to nothing do not count."""
+    lengths = [np.nan_to_num(np.linalg.norm(way, axis=1), posinf=0.0) for way in ways.values()]
+    furthest = [float(length.max(initial=0.0)) for length in lengths]
+    share = np.zeros(count)
+    for length, most in zip(lengths, furthest, strict=True):
+        if most > _NOTHING * max(furthest):
+            np.maximum(share, length / most, out=share)
+    return share
 
 
 def _to_front(rest: Floats, far: Floats) -> Floats:
@@ -155,7 +160,7 @@ def _to_front(rest: Floats, far: Floats) -> Floats:
 def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
     """The middle of a picture that shows all that moves, and half its height."""
     low, high = rest.min(axis=0), rest.max(axis=0)
-    moved = rest[far > _MOVES * far.max(initial=0.0)]
+    moved = rest[far > _MOVES]
     least = _LEAST * float((high - low)[[0, 2]].max()) / 2
     if len(moved):
         low, high = moved.min(axis=0), moved.max(axis=0)

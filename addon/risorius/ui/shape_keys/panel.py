@@ -155,7 +155,7 @@ def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) ->
     column = box.column(align=True)
     column.operator("risorius.choose_shape_key", text="Choose...", icon="VIEWZOOM")
     line = column.row(align=True)
-    for way, text in (("OWN", "Own Control"), ("NOTHING", "Leave Out"), ("NAME", "By Its Name")):
+    for way, text in (("OWN", "Own Control"), ("NOTHING", "Leave Out"), ("NAME", "By Name")):
         button = line.operator("risorius.assign_shape_key", text=text)
         button.way = way
     words.write(box, shown.who_knows(row), "ERROR" if row.holder else "NONE")
