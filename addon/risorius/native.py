@@ -33,6 +33,7 @@ if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
     )
     from risorius.anim.reactions import Reaction  # noqa: F401
     from risorius.author import JointRig  # noqa: F401
+    from risorius.author.heads.parts import HeadPart  # noqa: F401
     from risorius.author.input.shape_face import ShapeSet  # noqa: F401
     from risorius.controls.control_names import ControlNames  # noqa: F401
     from risorius.expressions import Expression  # noqa: F401

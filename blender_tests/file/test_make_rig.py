@@ -2,6 +2,7 @@
 """Make Rig from Shape Keys: a head of any make becomes a face that does what its keys did."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import bpy
@@ -9,11 +10,21 @@ import numpy as np
 import pytest
 import risorius
 from support import scene
+from support.layout import drawn
 
-_FILE = Path(__file__).parents[2] / "tests" / "python" / "support" / "face_shapes.py"
-_SPEC = importlib.util.spec_from_file_location("face_shapes", _FILE)
-face_shapes = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(face_shapes)
+_SUPPORT = Path(__file__).parents[2] / "tests" / "python" / "support"
+
+
+def _supporting(name):
+    """A module of the package's tests, which imports others by these names."""
+    spec = importlib.util.spec_from_file_location(name, _SUPPORT / f"{name}.py")
+    sys.modules[name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sys.modules[name])
+    return sys.modules[name]
+
+
+face_shapes = _supporting("face_shapes")
+likenesses = _supporting("likenesses")
 
 METRES = 0.01
 
@@ -201,3 +212,93 @@ def test_a_cancelled_rig_leaves_no_file(head, tmp_path):
     assert task.result is None
     assert "stopped" in str(task.error)
     assert not list(tmp_path.iterdir())
+
+
+def _add(name, geometry, shapes=None, place=(0, 0, 0), parent=None):
+    """A mesh of centimetres with y up, as an object somewhere."""
+    points, faces = geometry
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(to_blender(points).tolist(), [], np.asarray(faces).tolist())
+    mesh.materials.append(bpy.data.materials.new(name))
+    item = bpy.data.objects.new(name, mesh)
+    item.parent, item.location = parent, place
+    bpy.context.scene.collection.objects.link(item)
+    if shapes:
+        item.shape_key_add(name="Basis")
+    for key_name, delta in (shapes or {}).items():
+        key = item.shape_key_add(name=key_name)
+        key.data.foreach_set("co", to_blender(points + delta).astype(np.float32).ravel())
+        key.value = 0.0
+    return item
+
+
+@pytest.fixture
+def whole_head():
+    """A head that looks along +Y, with teeth of the same keys, eyes, hair, and a far-off cube."""
+    armature = bpy.data.objects.new("Body", bpy.data.armatures.new("Body"))
+    bpy.context.scene.collection.objects.link(armature)
+    armature.rotation_euler = (0.0, 0.0, np.pi)
+    points, faces, shapes = likenesses.skull()
+    row, moved = likenesses.with_moving_teeth(shapes)
+    left, right = likenesses.eyes()
+    for name, geometry, keys in (
+        ("Head", (points, faces), shapes),
+        ("Teeth", row, moved),
+        ("Eyes", likenesses.joined(left, right), None),
+        ("Hair", likenesses.ball([0, 5, -3], 10.5), None),
+    ):
+        _add(name, geometry, keys, (1.0, 2.0, 0.5), armature)
+    _add("Cube", likenesses.slab([0, 0, 0], [5, 5, 5]))
+    for item in bpy.context.scene.objects:
+        item.select_set(item.name in ("Head", "Eyes"))
+    bpy.context.view_layer.objects.active = bpy.data.objects["Eyes"]
+    bpy.context.view_layer.update()
+    return bpy.data.objects["Head"]
+
+
+def test_the_selected_meshes_and_those_of_their_armature_are_one_face(whole_head, tmp_path):
+    path = tmp_path / "anna.dna"
+    assert bpy.ops.risorius.make_rig.poll()  # a selected mesh has keys, the active one has none
+    assert make(path, levels=2, joints=12) == {"FINISHED"}
+    rig = made_face()
+    assert [b.name for b in rig.data.bones][2:4] == ["FACIAL_L_Eye", "FACIAL_R_Eye"]
+    named = {m.name.removeprefix("Head_"): m for m in scene.meshes(rig).values()}
+    meshes = {n.partition("_lod0")[0]: m for n, m in named.items() if "lod0" in n}
+    assert sorted(meshes) == ["Hair", "Head", "Teeth", "eyeLeft", "eyeRight"]
+    for name, material in (("Hair", "Hair"), ("Teeth", "Teeth"), ("eyeLeft", "Eyes")):
+        assert [m.name for m in meshes[name].data.materials] == [material]
+    place = np.array(rig.matrix_world.translation)
+    at_rest = {name: scene.evaluated(m) - place for name, m in meshes.items()}
+    assert at_rest["eyeLeft"].mean(axis=0) == pytest.approx([0.032, -0.069, 0.03], abs=1e-3)
+    for control, mesh, way in (
+        ("mouthCornerPullL", "Head", [0.008, 0.003, 0.007]),
+        ("jawOpen", "Teeth", None),
+        ("eyeLookUpL", "eyeLeft", None),
+    ):
+        scene.set_controls(rig, **{f"CTRL_expressions.{control}": 1.0})
+        moved = scene.evaluated(meshes[mesh]) - place - at_rest[mesh]
+        scene.set_controls(rig, **{f"CTRL_expressions.{control}": 0.0})
+        most = np.linalg.norm(moved, axis=1).argmax()
+        assert np.linalg.norm(moved[most]) > 0.004
+        if way is not None:
+            assert moved[most] == pytest.approx(way, abs=2e-3)
+            assert at_rest[mesh][most][0] > 0.02
+    only = tmp_path / "only.dna"
+    for item in bpy.context.scene.objects:
+        item.select_set(item.name in ("Head", "Eyes"))
+    bpy.context.view_layer.objects.active = whole_head
+    assert make(only, levels=1, joints=2, use_family=False, height=200.0) == {"FINISHED"}
+    dna = risorius.load(only)
+    assert [n.partition("_lod")[0] for n in dna.mesh_names] == ["Head", "eyeLeft", "eyeRight"]
+    assert np.ptp(np.asarray(dna.meshes[0].positions)[:, 1]) == pytest.approx(20.0, abs=0.1)
+
+
+def test_the_tab_offers_it_while_a_mesh_with_keys_is_selected(head, dna_file):
+    panel = scene.submodule("ui.face.panel").RISORIUS_PT_character
+    assert "risorius.make_rig" in drawn(panel).operators
+    rig = scene.load(dna_file)
+    bpy.context.view_layer.objects.active = head
+    assert "risorius.make_rig" in drawn(panel).operators
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = scene.meshes(rig)[0]
+    assert "risorius.make_rig" not in drawn(panel).operators

@@ -367,7 +367,7 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
 def test_joints_that_are_there_stay(folder):
     """A neck that has half of the lower vertices still carries them, a jaw keeps its motion."""
     read = spec.read_spec(folder / "spec.toml")
-    dna, _, _ = spec.read_face(read)
+    dna = spec.read_face(read).dna
     positions, _ = face_shapes.head()
     dna.joint_names = [*dna.joint_names, "neck", "jaw"]
     dna.joint_parents = [0, 0, 0, 1]
@@ -410,7 +410,7 @@ def test_joints_that_are_there_stay(folder):
 
 def test_what_goes_with_a_jaw_is_its_child(folder):
     """Half the way and with other expressions the skin is where jaw, skin and shapes had it."""
-    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     hinge = np.array([0, 0, -2.0])
     head = np.asarray(dna.neutral_joint_translations)[1]
@@ -469,7 +469,7 @@ def test_joints_of_a_pair_are_named_alike(made):
 
 
 def test_half_the_way_of_an_arc_is_no_worse_than_its_end(folder):
-    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     options = RigOptions(FitOptions(joints=40), tolerance_mm=None, lods=LodOptions(count=1))
     (errors,) = make_joint_rig(dna, options).errors
     for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"):
@@ -479,7 +479,7 @@ def test_half_the_way_of_an_arc_is_no_worse_than_its_end(folder):
 
 def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
     """The mesh of LOD 1 has every second row and column, and shapes of its own."""
-    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     positions, _ = face_shapes.head()
     grid = np.arange(len(positions)).reshape(face_shapes.DOWN, face_shapes.ACROSS)[::3, ::2]
     kept = grid.ravel()
@@ -667,7 +667,7 @@ def test_nothing_that_moves_is_refused_and_oddities_are_named(tmp_path):
 
 
 def test_progress_can_stop_it(folder):
-    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     shares = []
 
     def tell(share):

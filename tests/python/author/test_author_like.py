@@ -51,7 +51,7 @@ def people(tmp_path_factory):
     """(face of shapes, joint rig) of one, and of another that takes the joints over."""
     folder = tmp_path_factory.mktemp("like")
     face_shapes.write_all(folder)
-    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     first = make_joint_rig(dna, OPTIONS)
     reference = Reference.from_bytes(first.reference.to_bytes())
     second = other_person(dna)

@@ -162,7 +162,7 @@ def test_heads_of_no_size_or_of_any(tmp_path):
 
 
 def test_a_vertex_without_weights_goes_with_the_root(egg, tmp_path):
-    dna, _, _ = spec.read_face(spec.read_spec(egg))
+    dna = spec.read_face(spec.read_spec(egg)).dna
     mesh = dna.meshes[0]
     weights = np.array(mesh.skin_weights)
     weights[19] = 0

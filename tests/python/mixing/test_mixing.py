@@ -52,7 +52,7 @@ def faces(tmp_path_factory):
     """Three faces of one topology, made of joints; the second is narrow, the third far above."""
     folder = tmp_path_factory.mktemp("mixing")
     face_shapes.write_all(folder)
-    dna, _, _ = spec.read_face(spec.read_spec(folder / "spec.toml"))
+    dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
     first = make_joint_rig(dna, OPTIONS)
     out = [first.dna]
     for factors, lift in (([0.8, 1.1, 1.0], 0.0), ([1.2, 1.2, 1.2], 30.0)):

@@ -33,6 +33,8 @@ def value(v) -> bytes:
         return b"D" + struct.pack("<d", v)
     if isinstance(v, str):
         return b"S" + struct.pack("<I", len(v.encode())) + v.encode()
+    if isinstance(v, bytes):
+        return b"R" + struct.pack("<I", len(v)) + v
     letter = {"f4": b"f", "f8": b"d", "i8": b"l", "i4": b"i"}[v.dtype.str[1:]]
     raw = v.tobytes()
     packed = zlib.compress(raw) if len(raw) >= 128 else raw

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh with shape keys of any make as what a joint rig is made from."""
+"""Meshes with shape keys of any make as what a joint rig is made from."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
@@ -33,43 +33,116 @@ def usable_head(item: bpy.types.Object | None) -> bool:
     return keys is not None and len(keys.key_blocks) > 1
 
 
-def shapes_of(context: Context, item: MeshObject) -> native.ShapeSet:
-    """The mesh and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
+def head_of(context: Context) -> MeshObject | None:
+    """The active object if it is a mesh with shape keys, else the first that is selected."""
+    there = [context.active_object, *context.selected_objects]
+    return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 
-    Rotation and size of the object count, its place does not. A key is what it adds to the key that
-    it is relative to; muted ones are left out.
+
+def taken_with(context: Context, head: MeshObject) -> list[MeshObject]:
+    """The head, and all other meshes that are selected.
+
+    Args:
+        context: has the selection.
+        head: of head_of.
+    """
+    others = [item for item in context.selected_objects if item != head and _is_plain(item)]
+    return [head, *(cast(MeshObject, item) for item in others)]
+
+
+def relatives_of(context: Context, taken: Sequence[MeshObject]) -> list[MeshObject]:
+    """The visible meshes that have an armature or a parent in common with those that are taken.
+
+    Args:
+        context: has the view.
+        taken: of taken_with.
+    """
+    above = {owner for item in taken for owner in _owners(item)}
+    return [
+        cast(MeshObject, item)
+        for item in context.visible_objects
+        if item not in taken and _is_plain(item) and not above.isdisjoint(_owners(item))
+    ]
+
+
+def _is_plain(item: bpy.types.Object) -> bool:
+    """Whether an object is a mesh with faces, and no part of a face that was imported."""
+    if item.type != "MESH" or parts.rig_of(item) is not None:
+        return False
+    return bool(cast(MeshObject, item).data.polygons)
+
+
+def _owners(item: bpy.types.Object) -> set[bpy.types.Object]:
+    """What an object hangs on or is deformed by."""
+    found = {cast(bpy.types.ArmatureModifier, m).object for m in item.modifiers
+             if m.type == "ARMATURE"}  # fmt: skip
+    return {owner for owner in (*found, item.parent) if owner is not None}
+
+
+def shapes_of(
+    context: Context,
+    item: MeshObject,
+    others: Sequence[MeshObject] = (),
+    height_mm: float = 0.0,
+    said: Mapping[str, str | list[str]] | None = None,
+) -> native.ShapeSet:
+    """A head and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
+
+    Rotation and size of the objects count, the place of the head does not. A key is what it adds to
+    the key that it is relative to; muted ones are left out.
 
     Args:
         context: the scene says what a unit is.
         item: has shape keys, see usable_head.
+        others: meshes that belong to the head: teeth, eyes, hair.
+        height_mm: of the face from the chin to the top; 0: as large as it is.
+        said: what the user said that keys are, as risorius.author.input.said.
 
     Raises:
         HeadError: the keys are not relative, or the mesh has no polygons.
+        ShapeFileError: no key moves a vertex.
     """
-    keys = item.data.shape_keys
-    if keys is None or not keys.use_relative:
-        raise HeadError(told("The shape keys are not relative: turn on Relative in their panel."))
     if not item.data.polygons:
         raise HeadError(told("{name} has no faces.", name=item.name))
-    author, face = native.part("author.input.obj"), native.part("author.input.shape_face")
-    turn = np.array(item.matrix_world.to_3x3())
-    # Blender's x, z and -y are the file's x, y and z.
-    turn = turn[[0, 2, 1]] * np.array([[1.0], [1.0], [-1.0]])
-    turn *= 100.0 * context.scene.unit_settings.scale_length
+    heads, face = native.part("author.heads.parts"), native.part("author.input.shape_face")
+    rows = [_part_of(context, one, item) for one in (item, *others)]
+    # An object has the size that it has: a face that is made smaller would not fit its body.
+    size = {"height_mm": height_mm} if height_mm else {"scale": 1.0}
+    wishes = heads.Wishes(rather=item.name, **size)
+    join = native.part("author.heads.joining").join
+    joined = join(item.name, rows, "cm", wishes, said or {}, ("+X", "+Z", "-Y"))
+    return face.shape_set(item.name, joined)
 
-    def points(key: bpy.types.ShapeKey) -> Doubles:
+
+def _part_of(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
+    """A mesh and its shape keys, seen from where the head is."""
+    author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
+    # Blender's x, z and -y are the file's x, y and z.
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    axes *= 100.0 * context.scene.unit_settings.scale_length
+    turn = axes @ np.array(item.matrix_world.to_3x3(), np.float64)
+    apart = item.matrix_world.translation - head.matrix_world.translation
+    shift = axes @ np.array(apart, np.float64)
+
+    def points(key: bpy.types.ShapeKey | None) -> Doubles:
         out = np.empty(3 * len(item.data.vertices), np.float32)
-        key.data.foreach_get("co", out)
+        (item.data.vertices if key is None else key.data).foreach_get("co", out)
         return out.reshape(-1, 3).astype(np.float64) @ turn.T
 
+    keys = item.data.shape_keys
+    if keys is None:
+        mesh = author.ObjMesh(points(None) + shift, *_polygons(item))
+        return heads.HeadPart(item.name, mesh, {}, source=item.name)
+    if not keys.use_relative:
+        raise HeadError(told("The shape keys are not relative: turn on Relative in their panel."))
     cached = {key.name: points(key) for key in keys.key_blocks}
     deltas = {
         key.name: cached[key.name] - cached[key.relative_key.name]
         for key in keys.key_blocks
         if key != keys.reference_key and not key.mute
     }
-    mesh = author.ObjMesh(cached[keys.reference_key.name], *_polygons(item))
-    return face.ShapeSet(item.name, mesh, deltas)
+    mesh = author.ObjMesh(cached[keys.reference_key.name] + shift, *_polygons(item))
+    return heads.HeadPart(item.name, mesh, deltas, source=item.name)
 
 
 def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int]]]:
@@ -126,6 +199,7 @@ def rig_task(
             author.FitOptions(joints=joints),
             tolerance_mm,
             lods=author.LodOptions(count=levels),
+            kept=shapes.kept,
         )
         rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
         if not cancelled():
@@ -139,19 +213,27 @@ def rig_task(
     return Task(work)
 
 
-def take_materials(face: MeshObject, item: MeshObject) -> None:
-    """The head's materials on the new mesh, whose polygons are the same in the same order.
+def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
+    """The materials of what a face was made from on its meshes of LOD 0, whose polygons are the
+    same in the same order.
 
     Args:
-        face: the new mesh.
-        item: the head.
+        meshes: of the face.
+        shapes: what it was made from, of shapes_of.
     """
-    made = face.data
-    if not item.data.materials or len(made.polygons) != len(item.data.polygons):
-        return
-    made.materials.clear()
-    for material in item.data.materials:
-        made.materials.append(material)
-    index = np.empty(len(made.polygons), np.int32)
-    item.data.polygons.foreach_get("material_index", index)
-    made.polygons.foreach_set("material_index", index)
+    for number, part in enumerate(shapes.parts):
+        item = bpy.data.objects.get(part.source)
+        made = next((m for m in meshes if m[parts.MESH] == number), None)
+        if item is None or item.type != "MESH" or made is None:
+            continue
+        source = cast(MeshObject, item).data
+        index = np.empty(len(source.polygons), np.int32)
+        source.polygons.foreach_get("material_index", index)
+        if part.polygons is not None:
+            index = index[part.polygons]
+        if not source.materials or len(made.data.polygons) != len(index):
+            continue
+        made.data.materials.clear()
+        for material in source.materials:
+            made.data.materials.append(material)
+        made.data.polygons.foreach_set("material_index", index)

@@ -345,7 +345,10 @@ class Skin:
         graph, look = self.graph, self.look
         picture = look.image("roughness", data=True)
         if picture is not None:
-            return graph.image(picture, label="Roughness").outputs["Color"]
+            color = graph.image(picture, label="Roughness").outputs["Color"]
+            # glTF's pictures of this name have it in their green, metalness in their blue.
+            is_packed = look.found.of(look.base, "roughness").stem.endswith("_orm")
+            return graph.split_color(color)[1] if is_packed else color
         uneven = graph.noise(self.points, 7.0 / look.unit, detail=4.0)
         rough = graph.math("MULTIPLY_ADD", uneven, 0.22, 0.40)
         for area, less in (("nose", 0.10), ("forehead", 0.06), ("lips", 0.14)):

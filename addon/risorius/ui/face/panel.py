@@ -6,6 +6,7 @@ from ...logic.character import plans
 from ...scene.base import parts, saved
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import rig_placement, runtime
+from ...scene.file import shape_key_head
 from ...scene.hair import strands
 from ...scene.lod import lods
 from .. import words
@@ -39,6 +40,9 @@ class RISORIUS_PT_character(FacePanel, Panel):
         if draw_trouble(layout, context):
             return
         rig = parts.active_rig(context)
+        # Before what one does with a face: the selected mesh is none yet.
+        if parts.rig_of(context.object) is None and shape_key_head.head_of(context) is not None:
+            layout.operator("risorius.make_rig", icon="SHAPEKEY_DATA")
         if rig is None:
             _draw_start(layout)
             return

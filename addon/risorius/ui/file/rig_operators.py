@@ -3,11 +3,13 @@
 # pyright: reportInvalidTypeForm=false
 """A head with shape keys becomes a face: joints that do what its shapes did."""
 
+from collections.abc import Sequence
 from typing import cast
 
 import bpy
 
 from ... import native
+from ...logic.base import names
 from ...scene.base import parts
 from ...scene.base.blender_types import MeshObject
 from ...scene.character import build, rig_placement
@@ -23,7 +25,7 @@ from .import_operators import import_character
 
 
 class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
-    """Make a face of joints from the active mesh and its shape keys, and write it as a DNA file"""
+    """Make a face of joints from the selected meshes and their shape keys, as a DNA file"""
 
     bl_idname = "risorius.make_rig"
     bl_label = "Make Rig from Shape Keys"
@@ -54,32 +56,49 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         max=10.0,
     )
 
+    use_family: bpy.props.BoolProperty(
+        name="Take Others Along",
+        description="Also meshes of the same armature or parent: eyes, teeth, hair",
+        default=True,
+    )
+    height: bpy.props.FloatProperty(
+        name="Height",
+        description="Of the face from the chin to the top, in millimetres. 0: as it is",
+        default=0.0,
+        min=0.0,
+        max=100_000.0,
+    )
+
     @classmethod
     def poll(cls, context: Context) -> bool:
         if not usable(cls):
             return False
-        if not shape_key_head.usable_head(context.active_object):
+        if shape_key_head.head_of(context) is None:
             cls.poll_message_set(words.say("Select a mesh with shape keys that is no face yet."))
             return False
         return True
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         self.wait_beside()
-        if not self.filepath and context.active_object is not None:
-            self.filepath = proposed_file(context.active_object.name, ".dna")
+        head = shape_key_head.head_of(context)
+        if not self.filepath and head is not None:
+            self.filepath = proposed_file(head.name, ".dna")
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: Context) -> Result:
-        item = cast(MeshObject, context.active_object)
+        item = cast(MeshObject, shape_key_head.head_of(context))
         self.filepath = system_path(self.filepath)
+        taken = shape_key_head.taken_with(context, item)
+        family = shape_key_head.relatives_of(context, taken) if self.use_family else []
+        others = [*taken[1:], *family]
+        said = {k: v for one in (*others, item) for k, v in assigned.said_of(one).items()}
         try:
-            shapes = shape_key_head.shapes_of(context, item)
+            shapes = shape_key_head.shapes_of(context, item, others, self.height, said)
         except native.user_errors() as error:
             self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
-        self._head = item.name
+        self._head, self._shapes = item.name, shapes
         tolerance = self.tolerance if self.use_shapes else None
-        said = assigned.said_of(item)
         task = shape_key_head.rig_task(
             shapes, self.filepath, self.joints, self.levels, tolerance, said
         )
@@ -107,6 +126,8 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         if import_character(self, context, self.filepath, options) != {"FINISHED"}:
             return {"CANCELLED"}
         self._take_place(context, before)
+        for sentence in self._shapes.notes:
+            self.report({"INFO"}, sentence)
         for sentence in odd[:5]:
             self.report({"WARNING"}, sentence)
         largest = rig.levels[0].largest_with_shapes
@@ -126,7 +147,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
         if head is None or made is None:
             return
-        shape_key_head.take_materials(parts.meshes_of(made)[0], cast(MeshObject, head))
+        shape_key_head.take_materials(parts.meshes_of(made), self._shapes)
         rig_placement.put_beside_mesh(made, head)
         rig_placement.put_beside(context.scene, made)
         evaluate.bring_up(context, made)
@@ -143,6 +164,27 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         row = layout.row()
         row.active = self.use_shapes
         row.prop(self, "tolerance")
+        layout.prop(self, "height")
+        self._draw_meshes(context)
+
+    def _draw_meshes(self, context: Context) -> None:
+        """Which meshes become the face."""
+        head = shape_key_head.head_of(context)
+        if head is None:
+            return
+        taken = shape_key_head.taken_with(context, head)
+        column = self.layout.column()
+        words.write(column, words.say("Made of {names}", names=names.listed(_named(taken))))
+        family = shape_key_head.relatives_of(context, taken)
+        if family:
+            column.prop(self, "use_family")
+            also = column.column()
+            also.active = self.use_family
+            words.write(also, words.say("And of {names}", names=names.listed(_named(family))))
+
+
+def _named(items: Sequence[MeshObject]) -> list[str]:
+    return [item.name for item in items]
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:

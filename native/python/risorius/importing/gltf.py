@@ -203,6 +203,24 @@ class Document:
             raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
         return np.ndarray(shape, dtype, data, start, (stride, dtype.itemsize))
 
+    def view_bytes(self, index: object, place: str) -> bytes:
+        """The bytes of a buffer view, such as a picture.
+
+        Args:
+            index: of the view, as the file gives it.
+            place: what errors name: where the index stands.
+
+        Raises:
+            AnimationFileError: no such view, or one that reaches beyond its buffer.
+        """
+        view = self.item("bufferViews", index, place)
+        at = f"bufferViews[{index}]"
+        data = self._buffer(view.get("buffer"), at)
+        start, length = self.whole(view, "byteOffset", at), self.whole(view, "byteLength", at)
+        if start + length > len(data):
+            raise self.fail(at, f"{length} bytes from {start} were expected, the buffer is shorter")
+        return data[start : start + length]
+
     def _buffer(self, index: object, place: str) -> bytes:
         table = self.item("buffers", index, place)
         number = int(index)  # type: ignore[call-overload]  # item says it is one

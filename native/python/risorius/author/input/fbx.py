@@ -43,12 +43,48 @@ def read_fbx(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
+    scene = open_scene(path)
+    return mesh_of(scene, _choose(scene, path, mesh))
+
+
+def open_scene(path: Path, skipped: frozenset[str] = _SKIPPED) -> Scene:
+    """A binary FBX whose meshes are read.
+
+    Args:
+        path: of the file.
+        skipped: kinds of objects that are not read.
+
+    Raises:
+        ShapeFileError: another kind of file.
+        AnimationFileError: the file is damaged; with the place in it.
+    """
     data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a binary FBX", (signatures.FBX.code,))
     if not is_fbx(data):
         raise ShapeFileError(f"{path}: a binary FBX was expected")
-    scene = read_scene(Parser(data, str(path), Budget.of(len(data)), _SKIPPED))
-    number = _choose(scene, path, mesh)
+    return read_scene(Parser(data, str(path), Budget.of(len(data)), skipped))
+
+
+def meshes_of(scene: Scene) -> list[tuple[int, str]]:
+    """The number of each mesh, and the name of its node."""
+    out = []
+    for number, node in scene.of_kind("Geometry").items():
+        if _class_of(node) == "Mesh":
+            owner = _model_of(scene, number)
+            out.append((number, object_name(scene.objects[owner] if owner else node)))
+    return out
+
+
+def mesh_of(scene: Scene, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
+    """A mesh and its blend shapes, as read_fbx gives them; one without shapes too.
+
+    Args:
+        scene: of the file.
+        number: of the mesh, as meshes_of gives it.
+
+    Raises:
+        AnimationFileError: it is damaged; with the place in it.
+    """
     geometry = scene.objects[number]
     turn = _axes(scene) @ _to_world(scene, number)
     points = _triples(scene, geometry, "Vertices")

@@ -36,6 +36,18 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
+    document = open_document(path)
+    number = _choose(document, path, mesh)
+    return assembled(document, number)
+
+
+def open_document(path: Path) -> Document:
+    """A glTF whose meshes are read.
+
+    Raises:
+        ShapeFileError: another kind of file, or one whose meshes are compressed.
+        AnimationFileError: the file is damaged; with the place in it.
+    """
     data = read_bytes(path, found=True)
     refuse_other_kinds(path, "a glTF", (signatures.GLB.code,))
     if is_glb(data):
@@ -49,8 +61,7 @@ def read_gltf(path: Path, mesh: str = "") -> tuple[ObjMesh, dict[str, Doubles]]:
     for name in _COMPRESSED:
         if name in used:
             raise ShapeFileError(f"{path}: {name} is not read: export it without compression")
-    number = _choose(document, path, mesh)
-    return _assembled(document, number)
+    return document
 
 
 def _choose(document: Document, path: Path, wanted: str) -> int:
@@ -58,13 +69,23 @@ def _choose(document: Document, path: Path, wanted: str) -> int:
     rows = document.json.get("meshes")
     found = []
     for number, row in enumerate(rows if isinstance(rows, list) else []):
-        size = sum(_targets(p) * _vertices(document, p) for p in _primitives(document, row, number))
+        size = sum(_targets(p) * _vertices(document, p) for p in primitives(document, row, number))
         if size:
             found.append((number, str(row.get("name")), size))
     return choose_mesh(path, "morph targets", found, wanted)
 
 
-def _primitives(document: Document, row: object, number: int) -> list[dict[str, Any]]:
+def primitives(document: Document, row: object, number: int) -> list[dict[str, Any]]:
+    """The primitives of a mesh.
+
+    Args:
+        document: the file.
+        row: the mesh in it.
+        number: of the mesh.
+
+    Raises:
+        AnimationFileError: it has none.
+    """
     found = row.get("primitives") if isinstance(row, dict) else None
     if not isinstance(found, list) or not all(isinstance(p, dict) for p in found):
         raise document.fail(f"meshes[{number}]", "primitives were expected")
@@ -83,12 +104,21 @@ def _vertices(document: Document, primitive: Mapping[str, Any]) -> int:
     return document.whole(accessor, "count", f"accessors[{index}]")
 
 
-def _assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
+def assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doubles]]:
+    """A mesh and its morph targets, as read_gltf gives them; one without targets too.
+
+    Args:
+        document: the file.
+        number: of the mesh.
+
+    Raises:
+        AnimationFileError: it is damaged; with the place in it.
+    """
     row = document.json["meshes"][number]
     place = f"meshes[{number}]"
     parts = [
         _Part(document, primitive, f"{place}.primitives[{i}]")
-        for i, primitive in enumerate(_primitives(document, row, number))
+        for i, primitive in enumerate(primitives(document, row, number))
     ]
     counts = {len(part.deltas) for part in parts}
     if len(counts) != 1:
@@ -96,7 +126,8 @@ def _assembled(document: Document, number: int) -> tuple[ObjMesh, dict[str, Doub
     names = _names(row, counts.pop())
     turn = _node_matrix(document, number)[:3]
     points = np.concatenate([part.positions for part in parts])
-    deltas = np.stack([np.concatenate(d) for d in zip(*(p.deltas for p in parts), strict=True)])
+    rows = [np.concatenate(d) for d in zip(*(p.deltas for p in parts), strict=True)]
+    deltas = np.stack(rows) if rows else np.zeros((0, len(points), 3))
     begins = np.cumsum([0, *(len(part.positions) for part in parts)])
     corners = np.concatenate([p.corners + b for p, b in zip(parts, begins[:-1], strict=True)])
     uvs = np.concatenate([part.uvs for part in parts])
@@ -186,8 +217,25 @@ def _node_matrix(document: Document, mesh: int) -> Doubles:
     """float64[4, 4] of the first node with the mesh in the world; one for a mesh that none has."""
     nodes = document.json.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
+    # What is skinned stands where its joints are, which rest as the mesh lies.
+    found = next((n for n, node in enumerate(rows) if isinstance(node, dict)
+                  and node.get("mesh") == mesh and "skin" not in node), -1)  # fmt: skip
+    return world_matrix(document, found)
+
+
+def world_matrix(document: Document, found: int) -> Doubles:
+    """float64[4, 4] of a node in the world.
+
+    Args:
+        document: the file.
+        found: number of the node; below 0: none, which stands nowhere else.
+
+    Raises:
+        AnimationFileError: a node that is damaged; with the place in it.
+    """
+    nodes = document.json.get("nodes")
+    rows = nodes if isinstance(nodes, list) else []
     parents: dict[int, int] = {}
-    found = -1
     for number, node in enumerate(rows):
         if not isinstance(node, dict):
             raise document.fail(f"nodes[{number}]", "a table was expected")
@@ -195,9 +243,6 @@ def _node_matrix(document: Document, mesh: int) -> Doubles:
         for child in children if isinstance(children, list) else []:
             if isinstance(child, int):
                 parents[child] = number
-        # What is skinned stands where its joints are, which rest as the mesh lies.
-        if found < 0 and node.get("mesh") == mesh and "skin" not in node:
-            found = number
     out = np.eye(4)
     for _ in range(len(rows)):
         if found < 0:

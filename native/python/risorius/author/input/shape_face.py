@@ -9,11 +9,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ... import BlendShapeChannels, BlendShapeTarget, Dna, Mesh
+from ... import BlendShapeChannels, BlendShapeTarget, Dna, JointGroup, Mesh
 from ...base.easing import smooth_step
 from ...base.errors import ArgumentError
+from ...rigs.rotation import Convention
+from ..geometry import skeleton as sk
 from ..geometry.polygon_mesh import polygon_mesh, vertex_normals
 from ..geometry.skeleton import FARTHEST, Doubles
+from ..heads.joining import FacePart, Joined
+from ..heads.turning import Turn
 from .matching import PREFIX
 from .obj import ObjMesh, ShapeFileError
 
@@ -23,13 +27,40 @@ _LEAST = 1e-6  # of the mesh' size: a vertex that moves less rests
 
 @dataclass
 class ShapeSet:
-    """One mesh, y up, and its expressions, all in one unit."""
+    """One mesh, y up, and its expressions, all in one unit; of several meshes see heads.joining."""
 
     name: str
     mesh: ObjMesh
     expressions: dict[str, Doubles] = field(default_factory=dict)  # name -> displacement [V, 3]
     left: int = 1  # the character's left is +x (1) or -x (-1)
     unit: str = "cm"
+    parts: list[FacePart] = field(default_factory=list)  # meshes that it is divided into
+    turns: list[Turn] = field(default_factory=list)  # joints of eyes and jaw
+    notes: list[str] = field(default_factory=list)  # what was guessed, a sentence each
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Names of the meshes that turn with an eye's joint, and with no others."""
+        return tuple(f"{p.name}_lod" for p in self.parts if p.joint.endswith("_Eye"))
+
+
+def shape_set(name: str, head: Joined) -> ShapeSet:
+    """A head of several meshes as what a face is made from.
+
+    Args:
+        name: of the face.
+        head: the meshes.
+    """
+    return ShapeSet(
+        name,
+        head.mesh,
+        dict(head.shapes),
+        head.left,
+        head.unit,
+        head.parts,
+        head.turns,
+        head.notes,
+    )
 
 
 def check_shapes(shapes: ShapeSet) -> list[str]:
@@ -132,8 +163,9 @@ def combined_rows(
 
 
 def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> Dna:
-    """A Dna with one mesh, a raw control for each expression (or two where it is split by sides),
-    a blend shape for each control, and the joints root and head.
+    """A Dna with a mesh for each part, a raw control for each expression (or two where it is split
+    by sides), a blend shape for each control, and the joints root and head, eyes and jaw if it has
+    any.
 
     Args:
         shapes: the mesh and its expressions.
@@ -145,50 +177,107 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
     Raises:
         ValueError: all are left out.
     """
-    positions = shapes.mesh.positions
+    parts = shapes.parts or [
+        FacePart("", 0, len(shapes.mesh.positions), (0, len(shapes.mesh.faces)), "head")
+    ]
+    positions = shapes.mesh.positions[: parts[0].stop]
     deltas = _by_control(shapes, controls)
     if not deltas:
         raise ArgumentError("an expression that is a control was expected: all are left out")
     dna = Dna()
     dna.name, dna.db_name = shapes.name, "risorius"
     dna.archetype, dna.gender = "other", "other"
-    dna.coordinate_system = ("right" if shapes.left > 0 else "left", "up", "front")
+    dna.coordinate_system = ("right", "up", "front")
     dna.translation_unit = shapes.unit
     dna.lod_count = 1
     low, high = positions.min(axis=0), positions.max(axis=0)
     head = np.array([0.0, low[1] + 0.4 * (high[1] - low[1]), 0.4 * low[2] + 0.6 * high[2]])
-    dna.joint_names = ["root", "head"]
-    dna.joint_parents = [0, 0]
-    dna.neutral_joint_translations = np.array([np.zeros(3), head])
-    dna.neutral_joint_rotations = np.zeros((2, 3))
+    dna.joint_names = ["root", "head", *(turn.name for turn in shapes.turns)]
+    dna.joint_parents = [0, 0, *(1 for _ in shapes.turns)]
+    dna.neutral_joint_translations = np.array(
+        [np.zeros(3), head, *(turn.position - head for turn in shapes.turns)]
+    )
+    dna.neutral_joint_rotations = np.zeros((len(dna.joint_names), 3))
     names = list(deltas)
-    dna.raw_control_names = [PREFIX + name for name in names]
+    by_joints = dict.fromkeys(c for turn in shapes.turns for c in turn.motions if c not in deltas)
+    dna.raw_control_names = [PREFIX + name for name in (*names, *by_joints)]
     dna.blend_shape_channel_names = names
-    count = len(names)
+    count, columns = len(names), len(names) + len(by_joints)
     dna.blend_shape_channels = BlendShapeChannels(
         lods=[count], input_indices=range(count), output_indices=range(count)
     )
-    dna.joint_row_count, dna.joint_column_count = 18, count
-    mesh = _mesh(shapes.mesh)
-    size = float(np.ptp(positions, axis=0).max())
-    targets = []
-    for channel, delta in enumerate(deltas.values()):
-        moved = np.flatnonzero(np.linalg.norm(delta, axis=1) > _LEAST * size)
-        if len(moved):
-            targets.append(
-                BlendShapeTarget(
-                    deltas=delta[moved], vertex_indices=moved, blend_shape_channel_index=channel
-                )
-            )
-    mesh.blend_shape_targets = targets
-    dna.meshes, dna.mesh_names = [mesh], [f"{shapes.name}_lod0_mesh"]
-    dna.mesh_blend_shape_channel_mapping = np.array(
-        [(0, t.blend_shape_channel_index) for t in targets]
-    ).reshape(-1, 2)
-    dna.lod_mesh_mapping = [[0]]
-    dna.lod_joint_mapping = [[0, 1]]
+    dna.joint_row_count, dna.joint_column_count = 9 * len(dna.joint_names), columns
+    if shapes.turns:
+        dna.joint_groups = _turning(dna, shapes.turns)
+    _add_meshes(dna, shapes, parts, list(deltas.values()))
+    dna.lod_joint_mapping = [list(range(len(dna.joint_names)))]
     dna.lod_blend_shape_mapping = [range(count)]
     return dna
+
+
+def _turning(dna: Dna, turns: Sequence[Turn]) -> list[JointGroup]:
+    """What controls do to the joints of eyes and jaw."""
+    convention, out = Convention.of(dna), []
+    column = {name.removeprefix(PREFIX): i for i, name in enumerate(dna.raw_control_names)}
+    for joint, turn in enumerate(turns, len(dna.joint_names) - len(turns)):
+        values = np.zeros((6, len(turn.motions)))
+        for at, (rotation, shift) in enumerate(turn.motions.values()):
+            values[:3, at] = shift
+            values[3:, at] = sk.euler_angles(convention, rotation[None])[0]
+        inputs = [column[name] for name in turn.motions]
+        order, rows = np.argsort(inputs), np.flatnonzero(values.any(axis=1))
+        out.append(
+            JointGroup(
+                lods=[len(rows)],
+                input_indices=np.array(inputs)[order],
+                output_indices=9 * joint + rows,
+                values=values[rows][:, order].astype(np.float32),
+                joint_indices=[joint],
+            )
+        )
+    return out
+
+
+def _add_meshes(
+    dna: Dna, shapes: ShapeSet, parts: Sequence[FacePart], deltas: Sequence[Doubles]
+) -> None:
+    """A mesh for each part, with what moves of it."""
+    size = float(np.ptp(shapes.mesh.positions[: parts[0].stop], axis=0).max())
+    joints, meshes, mapping = list(dna.joint_names), [], []
+    for number, part in enumerate(parts):
+        mesh = _mesh(_part_mesh(shapes.mesh, part), joints.index(part.joint))
+        targets = []
+        for channel, delta in enumerate(deltas):
+            own = delta[part.start : part.stop]
+            moved = np.flatnonzero(np.linalg.norm(own, axis=1) > _LEAST * size)
+            if len(moved):
+                targets.append(
+                    BlendShapeTarget(
+                        deltas=own[moved], vertex_indices=moved, blend_shape_channel_index=channel
+                    )
+                )
+                mapping.append((number, channel))
+        mesh.blend_shape_targets = targets
+        meshes.append(mesh)
+    dna.meshes = meshes
+    dna.mesh_names = [f"{part.name or shapes.name}_lod0_mesh" for part in parts]
+    dna.mesh_blend_shape_channel_mapping = np.array(mapping).reshape(-1, 2)
+    dna.lod_mesh_mapping = [list(range(len(parts)))]
+
+
+def _part_mesh(mesh: ObjMesh, part: FacePart) -> ObjMesh:
+    if part.start == 0 and part.stop == len(mesh.positions):
+        return mesh
+    first, last = part.faces
+    uv_faces = mesh.uv_faces[first:last]
+    used, place = np.unique(np.concatenate(uv_faces), return_inverse=True)
+    ends = np.cumsum([len(face) for face in uv_faces])[:-1]
+    return ObjMesh(
+        mesh.positions[part.start : part.stop],
+        mesh.uvs[used],
+        [[v - part.start for v in face] for face in mesh.faces[first:last]],
+        [row.tolist() for row in np.split(place.ravel(), ends)],
+    )
 
 
 def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> dict[str, Doubles]:
@@ -227,7 +316,7 @@ def _shares(shapes: ShapeSet, delta: Doubles, named: Sequence[str]) -> list[Doub
     return [(part / whole)[:, None] for part in parts]
 
 
-def _mesh(source: ObjMesh) -> Mesh:
+def _mesh(source: ObjMesh, joint: int) -> Mesh:
     positions, count = source.positions, len(source.positions)
     uvs, uv_faces = source.uvs, source.uv_faces
     if not len(uvs) or not all(uv_faces):
@@ -236,6 +325,6 @@ def _mesh(source: ObjMesh) -> Mesh:
         positions, vertex_normals(positions, source.faces), source.faces, uvs, uv_faces
     )
     mesh.skin_offsets = np.arange(count + 1)
-    mesh.skin_weights, mesh.skin_joint_indices = np.ones(count), np.ones(count, np.int64)
+    mesh.skin_weights, mesh.skin_joint_indices = np.ones(count), np.full(count, joint, np.int64)
     mesh.maximum_influence_per_vertex = 1
     return mesh

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,15 +15,26 @@ from ...base.given import GivenError, finite, flag, several, shown, text, whole
 from ...base.reading import require_regular
 from ..correctives import CorrectiveOptions, add_correctives
 from ..fitting import FitOptions
-from ..geometry.skeleton import Doubles
+from ..heads.joining import join
+from ..heads.parts import Material, Wishes
 from ..levels import LodOptions
 from ..work import RigOptions
 from . import fbx, gltf, said
+from .fbx_head import read_fbx_head
+from .gltf_head import read_gltf_head
 from .matching import Assignment, assign
-from .obj import ShapeFileError, read_obj, read_positions
-from .shape_face import ShapeSet, check_shapes, combined_rows, make_shape_face, take_combined
+from .obj import ShapeFileError
+from .obj_head import find_neutral, read_obj_head
+from .shape_face import (
+    ShapeSet,
+    check_shapes,
+    combined_rows,
+    make_shape_face,
+    shape_set,
+    take_combined,
+)
 
-_READERS = {suffix: gltf.read_gltf for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: fbx.read_fbx}
+_READERS = {suffix: read_gltf_head for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: read_fbx_head}
 _BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
 _MOST_JOINTS = 4096
 _MOST_VERTICES = 1 << 26
@@ -33,7 +43,10 @@ _MOST_VERTICES = 1 << 26
 _names = partial(several, of=text)
 _Checks = Mapping[str, Callable[[object], Any]]
 _TABLES: dict[str, _Checks] = {
-    "source": dict.fromkeys(("dna", "neutral", "expressions", "mesh", "left", "unit"), text),
+    "source": dict.fromkeys(
+        ("dna", "neutral", "expressions", "mesh", "left", "up", "front", "unit"), text
+    )
+    | dict.fromkeys(("scale", "height_mm"), partial(finite, low=1e-6, high=1e9)),
     "joints": {
         "count": partial(whole, low=0, high=_MOST_JOINTS),
         "influences": partial(whole, low=1, high=16),
@@ -72,14 +85,41 @@ class Spec:
     controls: dict[str, said.Said] = field(default_factory=dict)
 
 
+@dataclass
+class Read:
+    """A face of blend shapes that was read.
+
+    Attributes:
+        dna: the face.
+        became: what each shape became; nothing where the source is a DNA.
+        odd: what is odd, guessed or left out, a sentence each.
+        materials: of meshes of the face, by their names.
+        kept: meshes that keep their joints, see RigOptions.
+    """
+
+    dna: Dna
+    became: Assignment
+    odd: list[str]
+    materials: dict[str, Material] = field(default_factory=dict)
+    kept: tuple[str, ...] = ()
+
+
 def read_spec(path: Path) -> Spec:
-    """The content of a SPEC.toml.
+    """The content of a SPEC.toml; of a head's own file or folder, that with nothing else said.
 
     Raises:
         ShapeFileError: no TOML, or a table, a name or a kind of value that is not known.
         OSError: the file cannot be read.
     """
-    table = _read_tables(path)
+    if path.is_dir():
+        source = {"neutral": find_neutral(path).name, "expressions": "."}
+        return Spec(path / "head", path.resolve().name, source, _options(path, {}))
+    if path.suffix.lower() in (*_READERS, *_BY_BLENDER):
+        return _spec_of(path, {"source": {"neutral": path.name}})
+    return _spec_of(path, _read_tables(path))
+
+
+def _spec_of(path: Path, table: dict[str, Any]) -> Spec:
     source = table.get("source", {})
     if ("dna" in source) == ("neutral" in source):
         raise ShapeFileError(f"{path}: source: either dna or neutral was expected")
@@ -166,12 +206,8 @@ def _correctives(table: dict[str, Any]) -> CorrectiveOptions:
     return CorrectiveOptions(**{"most": CorrectiveOptions.most if table else 0, **table})
 
 
-def read_face(spec: Spec) -> tuple[Dna, Assignment, list[str]]:
+def read_face(spec: Spec) -> Read:
     """The face of blend shapes that a spec names.
-
-    Returns:
-        The face; what each shape became (nothing where the source is a DNA); what is odd about the
-        shapes and their names, a sentence each.
 
     Raises:
         DnaError: the DNA file cannot be used.
@@ -181,42 +217,35 @@ def read_face(spec: Spec) -> tuple[Dna, Assignment, list[str]]:
     folder = spec.path.parent
     if "dna" in spec.source:
         require_regular(folder / spec.source["dna"])
-        return load(folder / spec.source["dna"]), Assignment({}, {}, {}, []), []
-    shapes = _read_shapes(spec, folder)
+        return Read(load(folder / spec.source["dna"]), Assignment({}, {}, {}, []), [])
+    shapes, about = _read_shapes(spec, folder)
     together = take_combined(shapes)
     odd = check_shapes(shapes)
     became = assign(shapes.expressions, spec.controls)
     dna = make_shape_face(shapes, became.controls)
+    looks = zip(dna.mesh_names, (part.material for part in shapes.parts), strict=True)
+    materials = {name: look for name, look in looks if look is not None}
     rows = combined_rows(str(spec.path), shapes, together, became.controls, dna.raw_control_names)
-    return add_correctives(dna, 0, rows) if rows else dna, became, odd + became.notes
+    if rows:
+        face = shapes.parts[0]
+        own = [(controls, delta[face.start : face.stop]) for controls, delta in rows]
+        dna = add_correctives(dna, 0, own)
+    return Read(dna, became, about + odd + became.notes, materials, shapes.kept)
 
 
-def _read_shapes(spec: Spec, folder: Path) -> ShapeSet:
-    neutral = folder / spec.source["neutral"]
-    morphs: dict[str, Doubles] = {}
+def _read_shapes(spec: Spec, folder: Path) -> tuple[ShapeSet, list[str]]:
+    """The head, and what was guessed about it."""
+    source, neutral = spec.source, folder / spec.source["neutral"]
     read = _READERS.get(neutral.suffix.lower())
     if read is not None:
-        mesh, morphs = read(neutral, spec.source.get("mesh", ""))
-        unit = "m"
+        parts, unit = read(neutral), "m"
     else:
-        mesh, unit = read_obj(neutral), "cm"
-    left = spec.source.get("left", "+x")
-    if left not in ("+x", "-x"):
-        raise ShapeFileError(f"{spec.path}: source.left: +x or -x was expected, found {left!r}")
-    out = ShapeSet(spec.name, mesh, {}, 1 if left == "+x" else -1, spec.source.get("unit", unit))
-    if out.unit not in ("cm", "m"):
-        raise ShapeFileError(f"{spec.path}: source.unit: cm or m was expected, found {out.unit!r}")
-    out.expressions.update(morphs)
-    if morphs:
-        return out
-    files = sorted((folder / spec.source["expressions"]).glob("*.obj"))
-    for path in files:
-        if os.path.realpath(path) == os.path.realpath(neutral):  # a loop of links is none
-            continue
-        out.expressions[path.stem] = read_positions(path, len(mesh.positions)) - mesh.positions
-    if not out.expressions:
-        raise ShapeFileError(
-            f"{folder / spec.source['expressions']}: a folder of OBJ files was expected, one for "
-            "each expression"
-        )
-    return out
+        expressions = folder / source["expressions"]
+        parts = read_obj_head(neutral, expressions, others=source["expressions"] == ".")
+        unit = "cm"
+    named = {name: source[name] for name in Wishes.__dataclass_fields__ if name in source}
+    where = str(spec.path if spec.path.suffix == ".toml" else neutral)
+    if named.get("unit") in ("cm", "m"):
+        unit = named["unit"]
+    head = join(where, parts, unit, Wishes(**named), spec.controls)
+    return shape_set(spec.name, head), head.notes

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from ...author.correctives import (
     find_correctives,
 )
 from ...author.fitting import bounded
+from ...author.heads.textures import metadata_of, texture_folder, textures_of
 from ...author.input import said as sayings
 from ...author.input.library import about_library, library_files, library_folder
 from ...author.input.matching import Assignment
@@ -29,21 +31,21 @@ from ...author.work import RigOptions
 from ...base.words import counted
 from ...controls.vocabulary import vocabulary
 from ...files import fileio
-from ..files import CommandLineError, require_suffix, whole_number
+from ..files import CommandLineError, number, require_suffix, whole_number
 from ..pages.authoring import need_plot, report_page
 
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
-as a DNA file; what joints leave beyond a tolerance stays as blend shapes. SPEC.toml says where the
-face is (a DNA file whose expressions are blend shapes; a glTF or FBX file; a neutral OBJ file and
-a folder with one for each expression) and what the rig is to be: see docs/authoring.md."""
+as a DNA file; what joints leave beyond a tolerance stays as blend shapes. HEAD is a glTF or FBX
+file, a folder of OBJ files, or a SPEC.toml that says where the face is (one of these, or a DNA file
+whose expressions are blend shapes) and what the rig is to be: see docs/authoring.md."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "author", help="make a joint rig from expressions", description=_DESCRIPTION
     )
-    parser.add_argument("spec", type=Path, nargs="?", metavar="SPEC.toml")
+    parser.add_argument("spec", type=Path, nargs="?", metavar="HEAD")
     parser.add_argument("-o", "--out", type=Path, metavar="OUT.dna", help="the DNA file to write")
     parser.add_argument(
         "--names",
@@ -63,6 +65,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--bound",
         action="store_true",
         help="fight the largest error for several times as long",
+    )
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument(
+        "--height-mm",
+        type=number(1.0, 1e6),
+        metavar="MM",
+        help="how high the face is, from the chin to the top; else its unit is guessed",
+    )
+    size.add_argument(
+        "--scale",
+        type=number(1e-6, 1e6),
+        metavar="FACTOR",
+        help="what the head's numbers are multiplied with",
     )
     parser.add_argument(
         "--correctives",
@@ -86,16 +101,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     spec = _spec(args)
+    _size(spec, args)
     options, asked = _options(spec, args), _correctives(spec, args)
-    dna, became, odd = read_face(spec)
-    for sentence in odd:
-        print(f"note: {sentence}", flush=True)
+    read = read_face(spec)
+    dna, became = read.dna, read.became
+    for sentence in read.odd:
+        print(f"note: {sentence}", file=sys.stderr if args.json else sys.stdout, flush=True)
     if args.names == "" or args.out is None:
         print("\n".join(as_names(became)))
         return 0
     fileio.check_writable(args.out)
     library = library_files(became, library_folder(args.out))
-    for path in library:
+    textures = textures_of(read.materials, texture_folder(args.out))
+    for path in (*library, *textures.files):
         fileio.check_writable(path, parents=True)
     if args.report is not None:
         require_suffix(args.report, (".html",), "--report")
@@ -103,6 +121,7 @@ def run(args: argparse.Namespace) -> int:
         if args.report.resolve() == args.out.resolve():
             raise CommandLineError("author: another file than that of -o was expected of --report")
         need_plot()
+    options = replace(options, kept=(*options.kept, *read.kept))
     say, source = _Clock(quiet=args.json), dna
     if asked.most or asked.together:
         say.line("looking for what goes wrong where expressions meet")
@@ -114,10 +133,16 @@ def run(args: argparse.Namespace) -> int:
         say.line("looking once more at what joints and shapes do together")
         rig.dna = correct_again(rig.dna, source, asked, say)
     said = json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out))
+    rig.dna.metadata = dict(rig.dna.metadata) | metadata_of(
+        rig.dna.mesh_names, read.materials, textures
+    )
     files = {args.out: rig.dna.to_bytes()}
-    files |= library
+    files |= library | textures.files
     if not args.json:
-        said = "\n".join([said, *about_library(became, library_folder(args.out))])
+        more = [*about_library(became, library_folder(args.out)), *textures.notes]
+        said = "\n".join([said, *more])
+    else:
+        print("\n".join(textures.notes), end="\n" if textures.notes else "", file=sys.stderr)
     if args.report is not None:
         files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
     fileio.write_all(files)  # the page last of what can fail: there is no face without it
@@ -159,6 +184,17 @@ def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:
     if args.joints_only:
         return replace(options, tolerance_mm=None)
     return replace(options, tolerance_mm=0.0) if args.exact else options
+
+
+def _size(spec: Spec, args: argparse.Namespace) -> None:
+    """What the command line says of a head's size goes before what the spec says."""
+    said = {"height_mm": args.height_mm, "scale": args.scale}
+    said = {name: value for name, value in said.items() if value is not None}
+    if said and "dna" in spec.source:
+        raise CommandLineError(f"author: a DNA file has its size: {next(iter(said))} is of others")
+    if said:
+        spec.source = {k: v for k, v in spec.source.items() if k not in ("height_mm", "scale")}
+        spec.source |= said
 
 
 def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:

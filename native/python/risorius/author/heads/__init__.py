@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""Heads as files have them: several meshes, any unit, any direction; made one face that stands."""

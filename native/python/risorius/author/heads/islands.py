@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Parts of a mesh that no polygon joins, and which of them are balls."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.words import joined
+from ..geometry.skeleton import Doubles, Ints
+from ..input.obj import ObjMesh
+from .parts import HeadPart, Material, first_vertices, taken_apart
+
+_INNER = re.compile(r"eye|iris|sclera|cornea|mouth|teeth|tooth|tongue|gum", re.IGNORECASE)
+_ROUND = 0.12  # of the radius: how far the vertices of a ball may lie off in the mean
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A sphere: the vertices that lie on it, float64[3] and its radius."""
+
+    vertices: Ints
+    middle: Doubles
+    radius: float
+
+
+def islands_of(mesh: ObjMesh) -> Ints:
+    """int64[V]: the number of the island of each vertex, from 0 in the order of vertices."""
+    count = len(mesh.positions)
+    label = np.arange(count)
+    if mesh.faces:
+        sizes = np.array([len(face) for face in mesh.faces])
+        corners = np.concatenate([np.asarray(face, np.int64) for face in mesh.faces])
+        begins = np.cumsum(sizes) - sizes
+        while True:
+            least = np.minimum.reduceat(label[corners], begins)
+            new = label.copy()
+            np.minimum.at(new, corners, np.repeat(least, sizes))
+            new = np.minimum(new, new[new])
+            new = new[new]
+            if np.array_equal(new, label):
+                break
+            label = new
+    return np.unique(label, return_inverse=True)[1].ravel()
+
+
+def divided(part: HeadPart, of_face: Ints, looks: Sequence[Material]) -> list[HeadPart]:
+    """A mesh, or its islands by the material that most of their polygons have. An island is cut
+    only along what is called eye, mouth and the like.
+
+    Args:
+        part: the mesh.
+        of_face: int64[polygons], which of the materials each has.
+        looks: the materials.
+    """
+    used = np.unique(of_face)
+    if len(used) < 2 or len(of_face) != len(part.mesh.faces):
+        most = int(np.bincount(of_face).argmax()) if len(used) else 0
+        part.material = looks[most] if len(used) else None
+        _tell(part, looks, set(used.tolist()) - {most})
+        return [part]
+    islands = islands_of(part.mesh)[first_vertices(part)]
+    counts = np.zeros((int(islands.max()) + 1, len(looks)))
+    np.add.at(counts, (islands, of_face), 1)
+    best = counts.argmax(axis=1)[islands]
+    inner = np.array([_INNER.search(look.name) is not None for look in looks])
+    best = np.where(inner[of_face], of_face, best)  # lids and lips hide where these are cut off
+    out: list[HeadPart] = []
+    for place in np.unique(best).tolist():
+        name = f"{part.source}_{looks[place].name}" if out else part.name
+        for piece in taken_apart(part, [name], np.where(best == place, 0, -1)):
+            piece.material = looks[place]
+            out.append(piece)
+    _tell(out[0], looks, set(used.tolist()) - set(best.tolist()))
+    return out
+
+
+def _tell(part: HeadPart, looks: Sequence[Material], lost: set[int]) -> None:
+    """A sentence where materials with pictures are left out."""
+    names = [looks[place].name for place in sorted(lost) if looks[place].pictures]
+    if names and part.material is not None:
+        part.material.notes.append(
+            f"{part.source}: {joined(names)} left out: polygons of other materials are joined to "
+            "theirs, and a mesh has one"
+        )
+
+
+def ball_of(points: Doubles, vertices: Ints, off: float = _ROUND) -> Ball | None:
+    """The sphere that vertices lie on, or more than a third of one; None where they do not.
+
+    Args:
+        points: float64[V, 3].
+        vertices: which of them.
+        off: how far they may lie off, of the radius.
+    """
+    own = points[vertices]
+    if len(own) < 12:
+        return None
+    origin = own.mean(axis=0)
+    rows = np.column_stack([2 * (own - origin), np.ones(len(own))])
+    solution, _, rank, _ = np.linalg.lstsq(rows, ((own - origin) ** 2).sum(axis=1), rcond=1e-9)
+    if rank < 4:
+        return None
+    middle = origin + solution[:3]
+    lengths = np.linalg.norm(own - middle, axis=1)
+    radius = float(lengths.mean())
+    extent = np.ptp(own, axis=0)
+    whole = extent.max() >= 1.2 * radius and extent.min() >= 0.8 * radius
+    if not whole or lengths.std() > off * radius:
+        return None
+    return Ball(vertices, np.asarray(middle), radius)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""How high a face is, and which unit makes it as high as faces are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...controls.regions import region_of
+from ..geometry.skeleton import Doubles
+
+# In millimetres.
+UNITS = {
+    "m": 1000.0, "cm": 10.0, "mm": 1.0, "inch": 25.4, "dm": 100.0, "foot": 304.8, "km": 1e6,
+    "0.1 mm": 0.1, "0.01 mm": 0.01, "10 m": 1e4,
+}  # fmt: skip
+SAID = ("m", "cm", "mm", "inch", "dm", "foot")  # those that a person may say
+_LEAST, _MOST, _USUAL = 180.0, 300.0, 230.0  # mm, of a face from the chin to the top
+_ODD = (120.0, 450.0)  # mm, what is taken for what the file says, with a sentence
+_MOVED = 0.3  # of the largest motion of a shape: what moves less is no chin
+
+
+def face_height(
+    points: Doubles, shapes: Mapping[str, Doubles], controls: Mapping[str, Sequence[str]]
+) -> float:
+    """From the chin, the lowest place that jaw and mouth move, to the top of the mesh.
+
+    A neck or a body below does not count.
+
+    Args:
+        points: float64[V, 3], y is up.
+        shapes: float64[V, 3] by name.
+        controls: raw controls without prefix by name; where none is of the jaw or the mouth, all
+            shapes count.
+    """
+    heights = points[:, 1]
+    meant = {n: {region_of(c) for c in controls.get(n, ())} for n in shapes}
+    jaw = [n for n in shapes if "jawOpen" in controls.get(n, ())]
+    lips = [n for n in shapes if meant[n] and meant[n] <= {"mouth", "jaw"}]
+    lowest = []
+    for name in jaw or lips or shapes:
+        delta = shapes[name]
+        length = np.linalg.norm(delta, axis=1)
+        if length.max(initial=0.0) > 1e-9 * (np.ptp(heights) or 1.0):
+            lowest.append(float(np.quantile(heights[length > _MOVED * length.max()], 0.02)))
+    chin = min(lowest) if lowest else float(heights.min())
+    return float(heights.max()) - chin
+
+
+def find_unit(height: float, unit: str, *, sure: bool) -> tuple[str, str]:
+    """The unit of a face's numbers, and a sentence where something is odd, "" for none.
+
+    Args:
+        height: of the face, in the file's numbers.
+        unit: what the format says.
+        sure: whether a person says so.
+    """
+    as_said = height * UNITS[unit]
+    usual = f"a face is {_LEAST / 10:.0f} to {_MOST / 10:.0f} cm high"
+    if sure or _ODD[0] <= as_said <= _ODD[1] or not height > 0:
+        if _LEAST <= as_said <= _MOST:
+            return unit, ""
+        return unit, f"the face is {in_words(as_said)} high in {unit}, and {usual}: {_MENDS}"
+    fits = [u for u in UNITS if _LEAST <= height * UNITS[u] <= _MOST]
+    if not fits:
+        return unit, (
+            f"the face is {in_words(as_said)} high in {unit}, {usual}, and in no unit that is "
+            f"known is it so: {_MENDS}"
+        )
+    # inch and foot only where no power of ten fits
+    best = min(fits, key=lambda u: (u in ("inch", "foot"), abs(np.log(height * UNITS[u] / _USUAL))))
+    return best, (
+        f"the face would be {in_words(as_said)} high in {unit}, and {usual}: taken as {best}, "
+        f"{in_words(height * UNITS[best])}; {_MENDS}"
+    )
+
+
+_MENDS = "height_mm, scale or unit (in Blender: Height) says otherwise"
+
+
+def in_words(mm: float) -> str:
+    """A length as people say it: 24.1 cm, 2.4 m."""
+    for least, unit in ((1000.0, "m"), (10.0, "cm")):
+        if mm >= least:
+            return f"{mm / UNITS[unit]:.3g} {unit}"
+    return f"{mm:.3g} mm"
+
+
+def check_unit(unit: str) -> str:
+    """What is wrong with a unit that was said, "" for nothing."""
+    return "" if unit in SAID else f"unit: one of {', '.join(SAID)} was expected, found {unit!r}"

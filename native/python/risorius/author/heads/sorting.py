@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""What each mesh of a head is: the face, what moves with it, what hangs on head or jaw, or none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...base.words import counted, joined
+from ..geometry.skeleton import Doubles
+from ..input.obj import ShapeFileError
+from .islands import islands_of
+from .parts import HeadPart, first_vertices, in_face_names, taken_apart
+from .sizes import in_words
+
+HEAD, JAW, FACE = "head", "FACIAL_C_Jaw", ""
+_MOUTH = re.compile(r"te[e]th|tooth|gum|tongue|mouth|jaw|dent", re.IGNORECASE)
+_TONGUE = re.compile(r"tongue", re.IGNORECASE)
+_LOWER = re.compile(r"low|bottom|down|mandib|(?:^|[_\W])[dl](?:[_\W]|$)", re.IGNORECASE)
+_UPPER = re.compile(r"upp?|top|maxill|(?:^|[_\W])u(?:[_\W]|$)", re.IGNORECASE)
+_COARSE = re.compile(r"lod_?[1-9]", re.IGNORECASE)
+_AROUND, _LARGEST = 0.75, 3.0  # of the face's height: how far off, how large what hangs on it is
+_ALIKE = 3  # names of one meaning, in a mesh of its own place: another head
+
+
+def moves(part: HeadPart) -> bool:
+    """Whether a shape of it moves a vertex."""
+    size = float(np.ptp(part.mesh.positions, axis=0).max()) or 1.0
+    return any(np.abs(d).max(initial=0.0) > 1e-6 * size for d in part.shapes.values())
+
+
+def choose_face(where: str, parts: Sequence[HeadPart], wanted: str, rather: str = "") -> HeadPart:
+    """The mesh with most vertices in shapes, or that of a name.
+
+    Args:
+        where: what errors call the file.
+        parts: all meshes.
+        wanted: its name, or "".
+        rather: its name where there are several heads.
+
+    Raises:
+        ShapeFileError: none that moves, none of that name, or two heads.
+    """
+    able = [part for part in parts if moves(part)]
+    named = [part for part in able if part.source == wanted] if wanted else able
+    if not named:
+        if able:
+            names = joined(dict.fromkeys(part.source for part in able))
+            raise ShapeFileError(f"{where}: source.mesh: {names} was expected, found {wanted}")
+        if any(part.shapes for part in parts):
+            raise ShapeFileError(f"{where}: no expression moves a vertex of a mesh")
+        raise ShapeFileError(f"{where}: a mesh with shapes was expected, found none")
+    face = max(named, key=lambda p: (len(p.shapes) * len(p.mesh.positions), -parts.index(p)))
+    others = [part for part in able if part is not face and is_other_head(face, part)]
+    chosen = [part for part in (face, *others) if part.source == rather]
+    if others and chosen:
+        return chosen[0]
+    if others and not wanted:
+        names = joined([face.name, *(part.name for part in others)])
+        raise ShapeFileError(
+            f"{where}: one head was expected, {names} have the same shapes at places of their own: "
+            "source.mesh says which one is meant"
+        )
+    return face
+
+
+def is_other_head(face: HeadPart, part: HeadPart) -> bool:
+    """Whether a mesh with shapes is a head of its own, beside the face.
+
+    Args:
+        face: the mesh that is the face.
+        part: the other one.
+    """
+    alike = len(set(in_face_names(face, part)) & set(face.shapes))
+    own, other = (np.ptp(p.mesh.positions, axis=0) for p in (face, part))
+    apart = np.abs(face.center - part.center) > 0.4 * (own + other)
+    return alike >= _ALIKE and bool(apart.any()) and bool(other.max() > 0.5 * own.max())
+
+
+def is_coarse(part: HeadPart) -> bool:
+    """Whether its name says that it is a coarser level of another mesh."""
+    return _COARSE.search(part.name) is not None
+
+
+class Places:
+    """Where a face's head and mouth are; y is up, z is the front, x is left, numbers are in mm."""
+
+    def __init__(self, face: HeadPart, height: float, mm: float, jaw_open: Doubles | None) -> None:
+        """Begins.
+
+        Args:
+            face: turned as above, in any unit.
+            height: of the face.
+            mm: of a unit.
+            jaw_open: float64[V, 3], what opens the mouth.
+        """
+        self.height, self.mm, self.jaw_open = height, mm, jaw_open
+        points = face.mesh.positions
+        self.low, self.high = points.min(axis=0), points.max(axis=0)
+        self.low[1] = self.high[1] - height
+        self.mouth = -np.inf
+        if jaw_open is not None:
+            length = np.linalg.norm(jaw_open, axis=1)
+            far = points[length > 0.6 * length.max()]
+            self.mouth = float(np.quantile(far[:, 1], 0.95))
+
+    def away(self, part: HeadPart) -> str:
+        """Why a mesh hangs on no head, "" where it does."""
+        extent = np.ptp(part.mesh.positions, axis=0)
+        if extent.max() > _LARGEST * self.height:
+            return f"it is {in_words(extent.max() * self.mm)} large"
+        low, high = self.low - part.center, part.center - self.high
+        off = np.maximum(np.maximum(low, high), 0.0)
+        if off.max() <= _AROUND * self.height and off[1] <= 0.5 * self.height:
+            return ""
+        return f"it lies {in_words(off.max() * self.mm)} from the face"
+
+    def in_mouth(self, part: HeadPart) -> bool:
+        """Whether a mesh lies where teeth and tongue do."""
+        low, high = part.mesh.positions.min(axis=0), part.mesh.positions.max(axis=0)
+        width = self.high[0] - self.low[0]
+        reach = 0.15 * self.height
+        return bool(
+            np.abs(part.center[0] - (self.low[0] + self.high[0]) / 2) < 0.15 * width
+            and high[0] - low[0] < 0.6 * width
+            and low[1] > self.low[1] - 0.02 * self.height
+            and abs(part.center[1] - self.mouth) < reach
+            and high[2] < self.high[2]
+        )
+
+
+def hung(part: HeadPart, places: Places) -> list[tuple[HeadPart, str]]:
+    """A mesh without shapes, or its islands, and the joint that each hangs on.
+
+    Args:
+        part: the mesh.
+        places: of the face.
+    """
+    if places.jaw_open is None or not (_MOUTH.search(part.name) or places.in_mouth(part)):
+        return [(part, HEAD)]
+    name = part.name
+    if _TONGUE.search(name) or (_LOWER.search(name) and not _UPPER.search(name)):
+        return [(part, JAW)]
+    if _UPPER.search(name):
+        return [(part, HEAD)]
+    islands = islands_of(part.mesh)
+    heights = part.mesh.positions[:, 1]
+    low = np.array(
+        [np.ptp(heights[islands == i]) / 2 + heights[islands == i].min() < places.mouth
+         for i in range(int(islands.max()) + 1)]
+    )  # fmt: skip
+    if low.all() or not low.any():
+        return [(part, JAW if low.all() else HEAD)]
+    pieces = taken_apart(
+        part, [f"{name}Upper", f"{name}Lower"], low[islands[first_vertices(part)]].astype(int)
+    )
+    return [(piece, JAW if piece.name == f"{name}Lower" else HEAD) for piece in pieces]
+
+
+def said_of(part: HeadPart, joint: str, shapes: Mapping[str, Doubles]) -> str:
+    """What becomes of a mesh, a sentence.
+
+    Args:
+        part: of it.
+        joint: what it hangs on; FACE: it moves with the face.
+        shapes: by the face's names, of those that move it.
+    """
+    if joint == FACE:
+        return f"{part.name} moves with the face: {counted(len(shapes), 'shape')} of it"
+    return f"{part.name} hangs on the {'jaw' if joint == JAW else 'head'}"

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: MIT
+"""Joints that a head has before any are sought: its eyes and its jaw, and what turns them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..geometry import skeleton as sk
+from ..geometry.rigid import about, rigid_fit
+from ..geometry.skeleton import Doubles, Ints
+from .islands import Ball, ball_of, islands_of
+from .parts import HeadPart, first_vertices, taken_apart
+
+# What the look controls turn an eye by, in degrees about x (down is above 0) and y (left is).
+_LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
+          "eyeLookRight": (0, -30)}  # fmt: skip
+_EYE = re.compile(r"eye|iris|pupil|sclera|cornea", re.IGNORECASE)
+_BESIDE = re.compile(r"lash|brow|lid|eyeline|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
+_NAMED_ROUND = 0.18  # of the radius, of what is called an eye: corneas bulge
+_SIZES = (0.02, 0.16)  # radius, of the face's height
+_INSIDE = 1.1  # of the radius: what lies within turns with the eye
+_NONE = np.zeros(0, np.int64)
+_FRONT, _SQUASH = 0.6, 0.25  # of the radius
+_LEAST_ANGLE = 0.03  # radians: what turns an eye less is none
+_NO_TURN = 0.4  # of a shape's motion: what leaves more of it when an eye turns is no turn
+_HELD, _CHIN = 0.7, 0.4  # of the jaw's motion, of its lowest: what is rigid there
+_FOLLOWS = 0.05  # of the jaw's motion
+
+
+@dataclass
+class Turn:
+    """A joint under the head and its motions.
+
+    Attributes:
+        name: of the joint.
+        position: float64[3].
+        motions: rotation [3, 3] and shift [3] of the position by raw control, without prefix.
+    """
+
+    name: str
+    position: Doubles
+    motions: dict[str, tuple[Doubles, Doubles]] = field(default_factory=dict)
+
+
+@dataclass
+class Eye:
+    """An eye: its side, L or R, its ball, and the parts that turn with it."""
+
+    side: str
+    ball: Ball
+    parts: list[HeadPart]
+
+    @property
+    def joint(self) -> str:
+        return f"FACIAL_{self.side}_Eye"
+
+
+def take_eyes(
+    parts: Sequence[HeadPart], height: float, lids: Mapping[str, Doubles]
+) -> tuple[list[HeadPart], list[Eye]]:
+    """Two round meshes, or two balls in one or two meshes, as eyes; and what is left of the parts.
+
+    Args:
+        parts: turned and centred, x is left.
+        height: of the face.
+        lids: float64[3] by side, L and R: the middle of what a blink moves.
+    """
+    labels = [islands_of(part.mesh) for part in parts]
+    found = [
+        (number, ball)
+        for number, part in enumerate(parts)
+        for ball in _balls(part, labels[number], height)
+    ]
+    pair = _pair(parts, found, lids)
+    if pair is None:
+        return list(parts), []
+    eyes = [Eye(side, ball, []) for side, (_, ball) in zip("LR", pair, strict=True)]
+    rest = []
+    for number, (part, islands) in enumerate(zip(parts, labels, strict=True)):
+        own = [ball.vertices[:1] if at == number else _NONE for at, ball in pair]
+        rest.extend(_divided(part, islands, eyes, own))
+    return rest, eyes
+
+
+def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
+    """The islands of a part that are as round and as large as eyes."""
+    named = _EYE.search(part.name) is not None
+    if _BESIDE.search(part.name):
+        return []
+    points, out = part.mesh.positions, []
+    order = np.argsort(islands, kind="stable")
+    for own in np.split(order, np.cumsum(np.bincount(islands))[:-1]):
+        if len(own) < 12 or np.ptp(points[own], axis=0).max() > 4 * _SIZES[1] * height:
+            continue
+        ball = ball_of(points, own, _NAMED_ROUND) if named else ball_of(points, own)
+        if ball is None or not _SIZES[0] * height < ball.radius < _SIZES[1] * height:
+            continue
+        if _looks_out(points, ball) and not _is_squashed(part, ball):
+            out.append(ball)
+    return out
+
+
+def _looks_out(points: Doubles, ball: Ball) -> bool:
+    """Whether a ball has its front, as no socket has that is drawn as the white of an eye."""
+    return bool(points[ball.vertices, 2].max() > ball.middle[2] + _FRONT * ball.radius)
+
+
+def _is_squashed(part: HeadPart, ball: Ball) -> bool:
+    """Whether a shape changes most of a ball's form, as lids do that are joined to a drawn eye."""
+    before = part.mesh.positions[ball.vertices]
+    for delta in part.shapes.values():
+        own = delta[ball.vertices]
+        if np.abs(own).max() < _SQUASH * ball.radius:
+            continue
+        rotation, moved = rigid_fit(before, before + own)
+        rest = before @ rotation.T + moved - before - own
+        if np.median(np.linalg.norm(rest, axis=1)) > _SQUASH * ball.radius:
+            return True
+    return False
+
+
+def _pair(
+    parts: Sequence[HeadPart], found: Sequence[tuple[int, Ball]], lids: Mapping[str, Doubles]
+) -> tuple[tuple[int, Ball], tuple[int, Ball]] | None:
+    """The largest two balls that may be the left and the right eye, and the part of each."""
+    best: tuple[tuple[bool, float], tuple[int, Ball], tuple[int, Ball]] | None = None
+    for i, left in found:
+        for j, right in found:
+            if left.middle[0] <= right.middle[0] or left is right:
+                continue
+            radius = (left.radius + right.radius) / 2
+            other = right.middle * [-1, 1, 1]
+            named = all(_EYE.search(parts[k].name) for k in (i, j))
+            off = np.linalg.norm(left.middle - other)
+            loose = 2.5 if named else 0.7  # an asymmetric head has eyes of its own places
+            if off > loose * radius or abs(left.radius - right.radius) > 0.4 * radius:
+                continue
+            if left.middle[0] - right.middle[0] < 2 * radius or not (
+                _under_lid(left, lids.get("L")) and _under_lid(right, lids.get("R"))
+            ):
+                continue
+            key = (named, radius)
+            if best is None or key > best[0]:
+                best = key, (i, left), (j, right)
+    return best[1:] if best else None
+
+
+def _under_lid(ball: Ball, lid: Doubles | None) -> bool:
+    return lid is None or bool(np.linalg.norm(ball.middle - lid) < 3 * ball.radius)
+
+
+def _divided(
+    part: HeadPart, islands: Ints, eyes: Sequence[Eye], own: Sequence[Ints]
+) -> list[HeadPart]:
+    """What is left of a part when its islands in the eyes' balls are theirs; own: a vertex of each
+    ball, where it is of this part."""
+    if _BESIDE.search(part.name):
+        return [part]
+    count = int(islands.max()) + 1
+    of_island = np.full(count, 2)
+    for number, eye in enumerate(eyes):
+        away = np.linalg.norm(part.mesh.positions - eye.ball.middle, axis=1)
+        furthest = np.zeros(count)
+        np.maximum.at(furthest, islands, away)
+        reach = _INSIDE * eye.ball.radius
+        if _EYE.search(part.name):
+            reach *= 1.2  # a cornea that bulges
+        of_island[furthest < reach] = number
+        of_island[islands[own[number]]] = number
+    if (of_island == 2).all():
+        return [part]
+    out: list[HeadPart] = []
+    kind = "cornea" if "cornea" in part.name.lower() else "eye"
+    for number, name in enumerate((f"{kind}Left", f"{kind}Right", part.name)):
+        labels = np.where(of_island[islands[first_vertices(part)]] == number, 0, -1)
+        theirs = eyes[number].parts if number < 2 else out
+        theirs.extend(taken_apart(part, [name], labels))
+    return out
+
+
+def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dict[str, float]]:
+    """The joint of an eye: shapes that turn the ball say by how much, else look controls have usual
+    angles. And by name how far what these shapes do beside that would move it.
+
+    Args:
+        eye: its parts keep the shapes that do not turn them, such as a pupil's.
+        controls: raw controls without prefix by shape.
+    """
+    turn = Turn(eye.joint, eye.ball.middle)
+    left: dict[str, float] = {}
+    kept: list[str] = []
+    names = dict.fromkeys(name for part in eye.parts for name in part.shapes)
+    points = np.concatenate([part.mesh.positions for part in eye.parts])
+    for name in names:
+        delta = np.concatenate(
+            [part.shapes.get(name, np.zeros_like(part.mesh.positions)) for part in eye.parts]
+        )
+        if np.abs(delta).max() < 1e-4 * eye.ball.radius:
+            continue
+        rotation, moved = rigid_fit(points, points + delta)
+        angle = float(np.linalg.norm(sk.rotation_vectors(rotation)))
+        every = controls.get(name, ())
+        own = [control for control in every if control.endswith(eye.side) or len(every) == 1]
+        arm = points - eye.ball.middle
+        # Shapes turn an eye about a point of their own, such as a joint of the body's rig.
+        rotation, shift = about(eye.ball.middle, rotation, moved)
+        rest = _longest(delta - (arm @ rotation.T + shift - arm))
+        if angle > _LEAST_ANGLE and own and rest < _NO_TURN * _longest(delta):
+            turn.motions.setdefault(own[0], (rotation, shift))
+            left[name] = rest
+        else:
+            kept.append(name)
+    for look, angles in _LOOKS.items():
+        x, y = np.radians(angles)
+        vector = np.array([[x, y, 0.0]])
+        rotation = sk.matrices_of_vectors(vector)[0]
+        turn.motions.setdefault(look + eye.side, (rotation, np.zeros(3)))
+    for part in eye.parts:
+        part.shapes = {name: part.shapes[name] for name in kept if name in part.shapes}
+    return turn, left
+
+
+def _longest(rows: Doubles) -> float:
+    return float(np.linalg.norm(rows, axis=1).max())
+
+
+def jaw_turn(
+    points: Doubles,
+    shapes: Mapping[str, Doubles],
+    controls: Mapping[str, Sequence[str]],
+    opening: Doubles,
+    whole: Sequence[str],
+) -> Turn | None:
+    """The jaw's joint: its hinge, and what each shape does to the chin; None where jawOpen turns
+    nothing.
+
+    Args:
+        points: float64[V, 3], of the face.
+        shapes: float64[V, 3] by name.
+        controls: raw controls without prefix by shape.
+        opening: float64[V, 3], what opens the mouth.
+        whole: names of shapes that move all of a mouth, as visemes do.
+    """
+    length = np.linalg.norm(opening, axis=1)
+    held = np.flatnonzero(length > _HELD * length.max())
+    heights = points[held, 1]
+    chin = held[heights <= np.quantile(heights, _CHIN)]
+    before = points[held]
+    rotation, shift = rigid_fit(before, before + opening[held])
+    if np.linalg.norm(sk.rotation_vectors(rotation)) < _LEAST_ANGLE:
+        return None
+    middle = before.mean(axis=0)
+    turned = shift - (middle - rotation @ middle)
+    arm, *_ = np.linalg.lstsq(np.eye(3) - rotation, turned, rcond=1e-3)
+    turn = Turn("FACIAL_C_Jaw", np.asarray(middle + arm))
+    least = _FOLLOWS * float(length[chin].mean())
+    for name, delta in shapes.items():
+        own = controls.get(name, ())
+        if len(own) != 1 or not (own[0].startswith("jaw") or name in whole):
+            continue
+        rows = held if delta is opening else chin
+        if np.linalg.norm(delta[rows], axis=1).mean() > least:
+            fitted = rigid_fit(points[rows], points[rows] + delta[rows])
+            turn.motions[own[0]] = about(turn.position, *fitted)
+    return turn

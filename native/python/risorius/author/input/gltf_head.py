@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: MIT
+"""All meshes of a glTF, each where its node stands, divided by materials; and these materials."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import copy
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+
+from ...importing.errors import AnimationFileError
+from ...importing.gltf import Document
+from ...importing.source import read_bytes
+from ..geometry.skeleton import Doubles
+from ..heads.islands import divided
+from ..heads.parts import HeadPart, Material, as_stored
+from . import gltf
+from .obj import ShapeFileError
+
+_KINDS = {"image/png": ".png", "image/jpeg": ".jpg", "image/webp": ".webp"}
+
+
+def read_gltf_head(path: Path) -> list[HeadPart]:
+    """The meshes of a glTF, in metres, y up.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        ShapeFileError: no mesh, or one of a kind that is not read.
+        AnimationFileError: the file is damaged; with the place in it.
+        BudgetError: more numbers than a file of this size may hold.
+    """
+    document = gltf.open_document(path)
+    rows = document.json.get("meshes")
+    out: list[HeadPart] = []
+    materials: dict[int, Material] = {}
+    for number, row in enumerate(rows if isinstance(rows, list) else []):
+        if not isinstance(row, dict):
+            raise document.fail(f"meshes[{number}]", "a table was expected")
+        for name, turn in _places(document, number, row):
+            source = _free(name, {part.source for part in out})
+            for part in _parts(document, number, source, materials):
+                out.append(_placed(part, turn))
+    if not out:
+        raise ShapeFileError(f"{path}: a mesh with morph targets was expected, found none")
+    return out
+
+
+def _free(name: str, taken: set[str]) -> str:
+    number, out = 1, name
+    while out in taken:
+        number += 1
+        out = f"{name}.{number}"
+    return out
+
+
+def _places(document: Document, number: int, row: Mapping[str, Any]) -> list[tuple[str, Doubles]]:
+    """The name of each node that has a mesh, and float64[4, 4] what it does beside the first."""
+    nodes = document.json.get("nodes")
+    rows = nodes if isinstance(nodes, list) else []
+    found = [n for n, x in enumerate(rows) if isinstance(x, dict) and x.get("mesh") == number]
+    names = [row.get("name"), *(rows[n].get("name") for n in found[:1])]  # packers drop some
+    own = next((n for n in names if isinstance(n, str) and n), f"mesh{number}")
+    skinned = [n for n in found if "skin" in rows[n]]
+    free = [n for n in found if "skin" not in rows[n]]
+    if not found or skinned:  # what is skinned stands where its joints are, however often
+        return [(own, np.eye(4))]
+    first = gltf.world_matrix(document, free[0])
+    out = [(own, np.eye(4))]
+    for node in free[1:]:
+        if abs(np.linalg.det(first[:3, :3])) > 1e-30:
+            turn = gltf.world_matrix(document, node) @ np.linalg.inv(first)
+            out.append((str(rows[node].get("name") or own), turn))
+    if len(out) > 1:
+        out[0] = (str(rows[free[0]].get("name") or own), out[0][1])
+    return out
+
+
+def _placed(part: HeadPart, turn: Doubles) -> HeadPart:
+    if not np.array_equal(turn, np.eye(4)):
+        part.mesh.positions = part.mesh.positions @ turn[:3, :3].T + turn[:3, 3]
+        part.shapes = {name: delta @ turn[:3, :3].T for name, delta in part.shapes.items()}
+        if np.linalg.det(turn[:3, :3]) < 0:
+            part.mesh.faces = [face[::-1] for face in part.mesh.faces]
+            part.mesh.uv_faces = [face[::-1] for face in part.mesh.uv_faces]
+    return part
+
+
+def _parts(
+    document: Document, number: int, source: str, materials: dict[int, Material]
+) -> list[HeadPart]:
+    """A mesh, or what of it has a material of its own and stands alone."""
+    row = document.json["meshes"][number]
+    groups: dict[int, list[dict[str, Any]]] = {}
+    for primitive in gltf.primitives(document, row, number):
+        kind = primitive.get("material")
+        if primitive.get("mode", 4) == 4:  # points and lines are no skin
+            groups.setdefault(kind if isinstance(kind, int) else -1, []).append(primitive)
+    if not groups:
+        return []
+    everything = [primitive for group in groups.values() for primitive in group]
+    mesh, shapes = gltf.assembled(_only(document, number, everything), number)
+    part = HeadPart(source, mesh, shapes, source=source)
+    looks = [_material(document, kind, materials) for kind in groups]
+    if len(looks) < 2:
+        part.material = looks[0]
+        return [part]
+    counts = [
+        len(gltf.assembled(_only(document, number, group), number)[0].faces)
+        for group in groups.values()
+    ]
+    of_face = np.repeat(np.arange(len(counts)), counts)
+    return divided(part, of_face, [look or Material("other") for look in looks])
+
+
+def _only(document: Document, number: int, primitives: list[dict[str, Any]]) -> Document:
+    """The same file with some primitives of a mesh alone."""
+    out = copy.copy(document)
+    meshes = list(document.json["meshes"])
+    meshes[number] = {**meshes[number], "primitives": primitives}
+    out.json = {**document.json, "meshes": meshes}
+    return out
+
+
+def _material(document: Document, number: int, known: dict[int, Material]) -> Material | None:
+    """What of a material a face takes along; None: there is none."""
+    if number < 0:
+        return None
+    if number not in known:
+        row = document.item("materials", number, "primitives.material")
+        out = known[number] = Material(str(row.get("name") or f"material{number}"))
+        own = row.get("pbrMetallicRoughness")
+        rough: Mapping[str, Any] = own if isinstance(own, dict) else {}
+        factor = rough.get("baseColorFactor")
+        if isinstance(factor, list) and len(factor) == 4 and _all_numbers(factor):
+            out.color = as_stored(factor)
+        uses = {"color": rough.get("baseColorTexture"), "normal": row.get("normalTexture"),
+                "orm": rough.get("metallicRoughnessTexture")}  # fmt: skip
+        for role, use in uses.items():
+            if isinstance(use, dict):
+                _add_picture(document, use, role, out)
+    return known[number]
+
+
+def _all_numbers(values: list[Any]) -> bool:
+    return all(isinstance(v, int | float) and -1e9 < v < 1e9 for v in values)
+
+
+def _add_picture(document: Document, use: Mapping[str, Any], role: str, out: Material) -> None:
+    """The picture of a role, or a sentence why it is left out."""
+    texture = document.item("textures", use.get("index"), f"{out.name}.{role}")
+    extra = texture.get("extensions")
+    extensions = extra if isinstance(extra, dict) else {}
+    webp = extensions.get("EXT_texture_webp")
+    index = webp.get("source") if isinstance(webp, dict) else texture.get("source")
+    if index is None:
+        names = ", ".join(extensions) or "no source"
+        out.notes.append(f"{out.name}: its {role} texture is left out: {names} is not read")
+        return
+    image = document.item("images", index, f"{out.name}.{role}")
+    try:
+        data = _image_bytes(document, image, f"images[{index}]")
+    except _PictureError as error:
+        out.notes.append(f"{out.name}: its {role} texture is left out: {error}")
+        return
+    out.pictures[role] = data
+
+
+def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> bytes:
+    uri = image.get("uri")
+    if uri is None:
+        return document.view_bytes(image.get("bufferView"), place)
+    if not isinstance(uri, str):
+        raise document.fail(place, "a uri was expected")
+    if uri.startswith("data:"):
+        try:
+            return base64.b64decode(uri.partition(",")[2], validate=True)
+        except (binascii.Error, ValueError) as error:
+            raise document.fail(place, f"base64 was expected: {error}") from error
+    file = unquote(uri)
+    # As for buffers: files in the glTF's own folder or below it, and no others on the disk.
+    if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
+        raise document.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
+    try:
+        return read_bytes(document.path.parent / file, found=True)
+    except AnimationFileError as error:
+        raise _PictureError(str(error)) from error
+
+
+class _PictureError(Exception):
+    """A picture in a file of its own that cannot be read: a face can do without."""
