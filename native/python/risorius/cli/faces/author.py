@@ -88,9 +88,10 @@ def run(args: argparse.Namespace) -> int:
     spec = _spec(args)
     options, asked = _options(spec, args), _correctives(spec, args)
     dna, became, odd = read_face(spec)
-    for sentence in odd:
-        print(f"note: {sentence}", flush=True)
-    if args.names == "" or args.out is None:
+    is_table = args.names == "" or args.out is None
+    for sentence in odd:  # in a table as comments: it is a file of names as it is printed
+        print(f"{'# ' * is_table}note: {sentence}", flush=True)
+    if is_table:
         print("\n".join(as_names(became)))
         return 0
     fileio.check_writable(args.out)
