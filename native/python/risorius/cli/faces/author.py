@@ -105,9 +105,11 @@ def run(args: argparse.Namespace) -> int:
     options, asked = _options(spec, args), _correctives(spec, args)
     read = read_face(spec)
     dna, became = read.dna, read.became
-    for sentence in read.odd:
-        print(f"note: {sentence}", file=sys.stderr if args.json else sys.stdout, flush=True)
-    if args.names == "" or args.out is None:
+    is_table = args.names == "" or args.out is None
+    for sentence in read.odd:  # in a table as comments: it is a file of names as it is printed
+        mark, into = "# " * is_table, sys.stderr if args.json else sys.stdout
+        print(f"{mark}note: {sentence}", file=into, flush=True)
+    if is_table:
         print("\n".join(as_names(became)))
         return 0
     fileio.check_writable(args.out)
