@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 import pytest
-from risorius import speech
+from risorius import expressions, speech
 from risorius.speech.audio import RATE
 from risorius.speech.phones import Phoneme
 from support import scene
@@ -93,6 +93,36 @@ def test_a_layer_shows_the_voice_at_every_frame(rig):
         now = present.of(rig)
         jaw = now.raw[now.live.labels.index(JAW)]
         assert jaw == pytest.approx(wanted[frame - 11], abs=0.006)
+
+
+def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
+    """Those beside its file; what moves a control that it lacks is another face's."""
+    slider = "CTRL_expressions.eyeLookUpL"  # which no voice of ours moves
+    dna = tmp_path / "anna.dna"
+    rig["risorius_source"] = str(dna)
+    folder = tmp_path / "anna_expressions"
+    folder.mkdir()
+    for name, control in (("aa", slider), ("nn", "CTRL_expressions.ofAnother")):
+        weights = {control: 1.0}
+        own = expressions.Expression(name, name, "viseme", "", weights)
+        (folder / f"{name}.toml").write_text(expressions.text_of(own))
+    library = {"aa": expressions.load(folder / "aa.toml")["aa"]}
+    wanted = speech.animate(heard(), rate=24.0, library=library).curve(slider)
+    plain = curves(speak(use_own_visemes=False))
+    assert (f'pose.bones["face"]["{slider}"]', 0) not in plain
+    action = speak()
+    curve = curves(action)[f'pose.bones["face"]["{slider}"]', 0]
+    assert wanted.max() > 0.3
+    frames = 11 + np.arange(len(wanted))
+    np.testing.assert_allclose([curve.evaluate(f) for f in frames], wanted, atol=0.006)
+    # A correction is made of the same visemes, wherever the folder is by now.
+    (folder / "aa.toml").unlink()
+    before = max(k.co.y for k in curve.keyframe_points)
+    for sound in action.risorius_spoken.sounds:
+        if sound.name == "AA":
+            sound.length = 1.0
+    curve = curves(action)[f'pose.bones["face"]["{slider}"]', 0]
+    assert 0.0 < max(k.co.y for k in curve.keyframe_points) < before
 
 
 # ---- corrections ----

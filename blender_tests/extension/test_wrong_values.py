@@ -28,12 +28,12 @@ PROPERTIES = {
         risorius_heat risorius_baked maps channels risorius_pull risorius_before""",
     "controls": """risorius_rig risorius_overdrive risorius_body_neck risorius_body_head
         risorius_baked risorius_lead risorius_pins risorius_handles_selected
-        risorius_handles_hidden risorius_version risorius_favourites risorius_tweak
+        risorius_handles_hidden risorius_curves risorius_version risorius_favourites risorius_tweak
         risorius_before""",
     "mesh": """risorius_rig dna_mesh dna_lods risorius_mode risorius_hide_viewport
         risorius_user_hide_viewport risorius_strands""",
     "key": "risorius_real risorius_key_names risorius_key_order risorius_opened risorius_before",
-    "mesh data": "risorius_heat_before risorius_heat",
+    "mesh data": "risorius_heat_before risorius_heat risorius_names",
     "joint": "dna_joint",
     "control bone": "risorius_part risorius_board",
     "slider": "CTRL_expressions.jawOpen",

@@ -22,12 +22,16 @@ def _library(folder, name):
     (folder / f"{name}.toml").write_text(text, encoding="utf-8")
 
 
+OF_HEADS = ("make_rig", "load_shape_key_names", "save_shape_key_names")
+
+
 def _calls(folder):
     """Operator -> calls with `//`, each with the file in the folder that it must have made."""
     risorius.Clip([JAW], [[0.0, 0.5]], 24.0).save(folder / "take.rzc")
     opened = 0.8 * (np.arange(240) % 60 < 20)
     risorius.Clip([JAW], [opened], 60.0).save(folder / "opens.rzc")
     (folder / "given.toml").write_text(RANGE, encoding="utf-8")
+    (folder / "names.toml").write_text('[controls]\njawOpen = "jawOpen"', encoding="utf-8")
     _library(folder / "bad", "grin")
     one = {"filepath": "//small.dna"}
     many = {"directory": "//", "files": [{"name": "small.dna"}]}
@@ -47,6 +51,9 @@ def _calls(folder):
         "learn_range": [({"filepath": "//opens.rzc"}, "")],
         "load_range": [({"filepath": "//given.toml"}, "")],
         "save_range": [({"filepath": "//saved.toml"}, "saved.toml")],
+        "load_shape_key_names": [({"filepath": "//names.toml"}, "")],
+        "save_shape_key_names": [({"filepath": "//kept.toml"}, "kept.toml")],
+        "save_curve_mapping": [({"filepath": "//map.toml", "use_import": False}, "map.toml")],
         "speak": {"filepath": "//voice.wav"},
     }
 
@@ -101,6 +108,8 @@ def test_two_slashes_begin_at_the_blend_in_every_operator(dna_file, tmp_path, mo
     }
     monkeypatch.setattr(scene.submodule("scene.export.web_page"), "page", lambda *_given: b"a page")
     heard = _deaf(monkeypatch)
+    curves = scene.submodule("scene.shape_keys.unknown_curves")
+    curves.keep(scene.controls(rig), curves.Unknown("arkit", {}, ["Key 1"]))
     bpy.context.view_layer.objects.active = scene.controls(rig)
     with pytest.raises(RuntimeError, match=r"voice.wav: nobody speaks"):
         run.speak(**table.pop("speak"))
@@ -108,7 +117,7 @@ def test_two_slashes_begin_at_the_blend_in_every_operator(dna_file, tmp_path, mo
     for name, calls in table.items():
         for given, made in calls:
             bpy.context.view_layer.objects.active = (
-                _head() if name == "make_rig" else scene.controls(rig)
+                _head() if name in OF_HEADS else scene.controls(rig)
             )
             if name == "mix_add" and len(bpy.context.window_manager.risorius_mix.parents):
                 run.mix_remove(index=0)

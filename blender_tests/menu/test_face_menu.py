@@ -19,6 +19,14 @@ ELSEWHERE = {
     *("mix_add", "mix_add_scene", "mix_remove", "mix_preview", "mix_write"),
     *("forget_range", "load_range", "save_range", "add_character", "set_lod"),
     *("set_lod_by_distance", "set_shape_mode", "set_strands", "reset_board", "select_board"),
+    *("assign_shape_key", "choose_shape_key", "select_shape_key", "shape_key_pictures"),
+    *(
+        "assign_curve",
+        "choose_curve",
+        "save_curve_mapping",
+        "load_shape_key_names",
+        "save_shape_key_names",
+    ),
     *("lead", "remove_board", "frame_board", "sound_set", "sound_insert", "sound_remove"),
 }
 

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
             text: str = "",
             icon: Icon = "NONE",
             depress: bool = False,
+            emboss: bool = True,
             translate: bool = True,
         ) -> OperatorButton: ...
         def panel(
@@ -100,6 +101,7 @@ if TYPE_CHECKING:
         def filter_items(
             self, context: Context, data: Any, property: str
         ) -> tuple[list[int], list[int]]: ...
+        def draw_filter(self, context: Context, layout: UILayout) -> None: ...
 
     class FileHandler(bpy.types.FileHandler):
         """What takes files that are dropped onto a window."""

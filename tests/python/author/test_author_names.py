@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import command_line
 import face_shapes
+import numpy as np
 import pytest
 import risorius
 from risorius import expressions
-from risorius.author.input import matching
+from risorius.author.input import matching, obj, said, shape_face
 from risorius.controls import arkit
 
 PREFIX = "CTRL_expressions."
@@ -113,10 +114,76 @@ def authored(tmp_path_factory):
 
 def test_the_command_tells_what_names_become(authored):
     folder, names, said = authored
-    assert '"viseme_aa" = "viseme_aa"  # the expression aa' in names
+    assert '"viseme_aa" = "@aa"' in names
     assert '"jawOpen" = "jawOpen"\n' in names
     assert "# 10 of 10 names are known: " in names
     assert f"{folder / 'egg_expressions'}: 2 expressions of the face itself" in said
+
+
+def test_what_is_printed_says_the_same_when_it_is_read(authored):
+    folder, names, _ = authored
+    path = folder / "names.toml"
+    path.write_text(names.replace('"@aa"', '"jawOpen"'), encoding="utf-8")
+    again = command_line.run("author", folder / "spec.toml", "--names", path, text=True)
+    assert said.parse(again.stdout) == said.parse(names) | {"viseme_aa": "viseme_aa"}
+    assert said.parse(names)["Joy"] == "@joy"
+    assert "# note: jawOpen and viseme_aa both mean jawOpen" in again.stdout
+
+
+def test_a_person_says_units_expressions_and_nothing(tmp_path):
+    path = tmp_path / "names.toml"
+    told = {
+        "Key 1": "=mouthFunnel",
+        "Key 2": "@joy",
+        "Blush 🌸": [],
+        'a "b"\x7f': ["jawOpen", "CTRL_expressions.tongueOut"],
+    }
+    path.write_text(said.text_of(told), encoding="utf-8")
+    assert said.read(path) == told
+    found = matching.assign([*told, "Key 3", "eyeBlinkLeft", "smile"], said.read(path))
+    assert found.controls["Key 1"] == [
+        name.removeprefix(PREFIX) for name in arkit.mapping()["mouthFunnel"]
+    ]
+    assert (found.controls["Key 2"], found.expressions) == (["Key_2"], {"Key 2": "joy"})
+    assert found.controls["Blush 🌸"] == []
+    assert found.controls['a "b"\x7f'] == ["jawOpen", "tongueOut"]
+    assert list(found.by.values()) == ["person"] * 4 + ["", "arkit", "words"]
+    assert found.notes == []
+
+
+def test_what_is_left_out_is_no_control():
+    positions, faces = face_shapes.head()
+    corners = [list(face) for face in faces]
+    mesh = obj.ObjMesh(positions, np.zeros((0, 2)), corners, [[] for _ in corners])
+    shapes = shape_face.ShapeSet("egg", mesh, face_shapes.expressions(positions))
+    together = {"jawOpen+eyeBlinkLeft": shapes.expressions["jawOpen"]}
+    became = matching.assign(shapes.expressions, {"jawOpen": []})
+    dna = shape_face.make_shape_face(shapes, became.controls)
+    assert PREFIX + "eyeBlinkL" in dna.raw_control_names
+    assert len(dna.raw_control_names) == len(shapes.expressions) - 1
+    rows = shape_face.combined_rows("", shapes, together, became.controls, dna.raw_control_names)
+    assert rows == []
+    with pytest.raises(ValueError, match="all are left out"):
+        shape_face.make_shape_face(shapes, {name: [] for name in shapes.expressions})
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('[controls]\na = "=smile"', "controls.a: an ARKit unit such as =jawOpen was expected"),
+        ('[controls]\na = "@../b"', "controls.a: letters, digits, _ and - were expected"),
+        ('[controls]\na = ["@joy", "jawOpen"]', "controls.a: an expression alone or controls"),
+        ("[controls]\na = 3", "controls.a: text was expected"),
+        ("a = 3", "a table [controls] was expected"),
+        ("[controls", "names.toml"),
+    ],
+)
+def test_a_file_of_names_that_says_nothing_is_one_sentence(content, words, tmp_path):
+    path = tmp_path / "names.toml"
+    path.write_text(content, encoding="utf-8")
+    with pytest.raises(ValueError, match="names.toml") as caught:
+        said.read(path)
+    assert words in str(caught.value)
 
 
 def test_an_expression_of_the_face_moves_it(authored):

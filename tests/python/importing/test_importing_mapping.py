@@ -282,3 +282,25 @@ def test_a_take_and_the_live_stream_turn_the_same_way():
         for control, weight in row.items():
             if control in signs:
                 assert signs[control] == weight, control
+
+
+def test_rows_of_ones_own_go_over_any_mapping(tmp_path):
+    path = tmp_path / "mine.toml"
+    rows = {'Key "1"': {"CTRL_expressions.jawOpen": 0.5}, "Key 2": {"@PP": 1.0}, "hat": {}}
+    path.write_text(importing.mapping_with("arkit", rows), encoding="utf-8")
+    mine = importing.load_mapping(path)
+    assert mine.rows['Key "1"'] == {"CTRL_expressions.jawOpen": 0.5}
+    assert mine.rows["Key 2"] == dict(risorius.expressions.get("PP").weights)
+    assert mine.rows["hat"] == {}
+    assert mine.rows["eyeBlinkLeft"] == importing.load_mapping("arkit").rows["eyeBlinkLeft"]
+    more = '[controls]\n"*Blink*" = { gain = 2, curve = [[0.0, 0.1], [1, 1.5]] }\n'
+    path.write_text(path.read_text(encoding="utf-8") + more, encoding="utf-8")
+    text = importing.mapping_with(str(path), {"hat": {"CTRL_expressions.earUpL": 1.0}})
+    again = importing.mapping.parse_mapping(text, "again")
+    assert again.rows["hat"] == {"CTRL_expressions.earUpL": 1.0}
+    assert again.rows["Key 2"] == mine.rows["Key 2"]
+    assert again.controls == importing.load_mapping(path).controls != {}
+    bare = importing.mapping.parse_mapping(importing.mapping_with("", {"a": {"b.c": 1.0}}), "bare")
+    assert bare.rows == {"a": {"b.c": 1.0}}
+    with pytest.raises(importing.MappingError, match="nowhere"):
+        importing.mapping_with(str(tmp_path / "nowhere.toml"), rows)

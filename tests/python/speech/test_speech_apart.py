@@ -11,6 +11,7 @@ import espeak_truth
 import limits
 import numpy as np
 import pytest
+from risorius.expressions import Expression
 from risorius.speech import AudioError, CancelledError, apart, speak
 from risorius.speech.recogniser import MissingError
 
@@ -49,13 +50,16 @@ def processes(monkeypatch):
 
 
 def test_it_is_the_same_speech(voice, monkeypatch):
-    wanted = speak(voice, WORDS, seed=3, rate=30.0)
+    own = Expression("aa", "Aa", "viseme", "", {"CTRL_expressions.open_A": 0.9})
+    options = {"seed": 3, "rate": 30.0, "library": {"aa": own}}
+    wanted = speak(voice, WORDS, **options)
+    assert "CTRL_expressions.open_A" in wanted.names
     # What this process has is of no account: it could not even import the recogniser.
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     with pytest.raises(MissingError):
         speak(voice, WORDS)
     shares = []
-    clip = apart.speak_apart(voice, WORDS, progress=shares.append, seed=3, rate=30.0)
+    clip = apart.speak_apart(voice, WORDS, progress=shares.append, **options)
     assert clip.names == wanted.names
     assert np.array_equal(clip.curves, wanted.curves)
     assert (clip.rate, clip.events, clip.metadata) == (30.0, wanted.events, wanted.metadata)

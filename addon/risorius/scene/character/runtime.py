@@ -278,6 +278,15 @@ def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
     last_written.forget()
 
 
+def compiled(content: bytes) -> Runtime:
+    """The Runtime of a file that is no character of the scene, in metres. Args: content  a DNA.
+
+    Raises:
+        DnaError, SpaceError, ValueError: it cannot be used.
+    """
+    return _compile(content, 1.0)
+
+
 def _compile(content: bytes, unit: float) -> Runtime:
     risorius = native.module()
     dna = risorius.load(content)

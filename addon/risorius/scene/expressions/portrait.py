@@ -7,7 +7,7 @@ user's scene is never touched for them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,7 @@ _KEY = np.array([-0.45, 0.55, 0.70])  # light from the upper left
 _FILL = np.array([0.75, 0.05, 0.65])
 _TOP = np.array([0.42, 0.42, 0.43])  # behind the face
 _BOTTOM = np.array([0.27, 0.27, 0.28])
+_STILL_GLOSS = 0.07  # of a mesh that is no character's
 _FAR = 15.0  # where one looks from, in distances between the eyes
 
 
@@ -110,17 +111,63 @@ def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floa
     Returns:
         float64[size, size, 3] in [0, 1], row 0 at the bottom.
     """
+    return draw_places(sitter, places(sitter, sliders), size)
+
+
+def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
+    """Where the vertices of each piece are: float64[V, 3] in file space.
+
+    Args:
+        sitter, sliders: as of draw.
+    """
     live = sitter.live
     rests = dict(zip(live.labels, live.rests, strict=True))
     raw = np.array([sliders.get(name, rests[name]) for name in live.labels], np.float32)
     pose = live.rig.evaluate(raw)
     moves = _moves(live, np.asarray(pose.joints, np.float64))
+    return [_posed(live, piece, moves, pose.blend_shapes) for piece in sitter.pieces]
+
+
+def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> Floats:
+    """The face with its vertices at these places, as draw.
+
+    Args:
+        sitter, size: as of draw.
+        placed: of `places`.
+    """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
     picture = _Picture(high)
-    for piece in sorted(sitter.pieces, key=lambda one: one.hairs):
-        points = _posed(live, piece, moves, pose.blend_shapes)
-        picture.add(piece, _on_screen(live, points, view, scale, high))
+    pairs = zip(sitter.pieces, placed, strict=True)
+    for piece, points in sorted(pairs, key=lambda pair: pair[0].hairs):
+        picture.add(piece, _on_screen(sitter.live.space.points(points), view, scale, high))
+    return _averaged(picture.lit(), _SMOOTH)
+
+
+def draw_still(
+    points: Floats,
+    triangles: Ints,
+    colors: Floats,
+    frame: tuple[Floats, float],
+    size: int = SIZE,
+) -> Floats:
+    """A mesh that is no character's, seen from the front.
+
+    Args:
+        points: float64[V, 3] in Blender's axes; the face looks along -y.
+        triangles: int64[F, 3].
+        colors: float64[F, 3] in [0, 1].
+        frame: the middle of the picture, and half its height.
+        size: pixels each way.
+
+    Returns:
+        As draw.
+    """
+    high = size * _SMOOTH
+    uvs, none = np.zeros((*triangles.shape, 2)), np.zeros((len(points), 0), np.float32)
+    piece = Piece(0, triangles, uvs, colors, None, _STILL_GLOSS, False, none, ())
+    picture = _Picture(high)
+    picture.add(piece, _on_screen(points, *frame, high))
     return _averaged(picture.lit(), _SMOOTH)
 
 
@@ -167,11 +214,9 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
     return (low + high) / 2, 1.05 * half
 
 
-def _on_screen(
-    live: runtime.Runtime, points: Floats, middle: Floats, half: float, high: int
-) -> Floats:
+def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats:
     """Pixels to the right and down, and towards who looks; a little nearer is a little larger."""
-    seen = (live.space.points(points) - middle)[:, [0, 2, 1]] / half
+    seen = (points - middle)[:, [0, 2, 1]] / half
     seen[:, 2] *= -1.0  # the face looks along -y
     seen[:, :2] *= (_FAR / (_FAR - seen[:, 2]).clip(1.0))[:, None]
     screen = seen * (high / 2)

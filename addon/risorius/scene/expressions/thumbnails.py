@@ -86,6 +86,12 @@ def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
     return portrait.Sitter(live, tuple(pieces)) if pieces else None
 
 
+def plain_pieces(live: runtime.Runtime) -> list[portrait.Piece]:
+    """What the pictures of a file are drawn from that is no character of the scene: without
+    materials. Args: live  its Runtime."""
+    return [_piece(live, index, (), {}) for index in _meshes(live)]
+
+
 def _meshes(live: runtime.Runtime) -> list[int]:
     """Of each mesh of the finest level the finest form with few enough faces, else the coarsest."""
     dna = live.dna

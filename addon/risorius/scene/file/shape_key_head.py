@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import cast
 
@@ -84,6 +84,7 @@ def shapes_of(
     item: MeshObject,
     others: Sequence[MeshObject] = (),
     height_mm: float = 0.0,
+    said: Mapping[str, str | list[str]] | None = None,
 ) -> native.ShapeSet:
     """A head and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
 
@@ -95,6 +96,7 @@ def shapes_of(
         item: has shape keys, see usable_head.
         others: meshes that belong to the head: teeth, eyes, hair.
         height_mm: of the face from the chin to the top; 0: as large as it is.
+        said: what the user said that keys are, as risorius.author.input.said.
 
     Raises:
         HeadError: the keys are not relative, or the mesh has no polygons.
@@ -108,7 +110,8 @@ def shapes_of(
     size = {"height_mm": height_mm} if height_mm else {"scale": 1.0}
     wishes = heads.Wishes(rather=item.name, **size)
     join = native.part("author.heads.joining").join
-    return face.shape_set(item.name, join(item.name, rows, "cm", wishes, {}, ("+X", "+Z", "-Y")))
+    joined = join(item.name, rows, "cm", wishes, said or {}, ("+X", "+Z", "-Y"))
+    return face.shape_set(item.name, joined)
 
 
 def _part_of(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
@@ -161,7 +164,12 @@ def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int
 
 
 def rig_task(
-    shapes: native.ShapeSet, path: str, joints: int, levels: int, tolerance_mm: float | None
+    shapes: native.ShapeSet,
+    path: str,
+    joints: int,
+    levels: int,
+    tolerance_mm: float | None,
+    said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[tuple[native.JointRig, list[str]]]:
     """The making of a joint rig, which ends with the file; a cancelled one leaves none.
 
@@ -171,6 +179,7 @@ def rig_task(
         joints: new ones.
         levels: of detail.
         tolerance_mm: what blend shapes keep; None: joints alone.
+        said: what the user said that keys are, as risorius.author.input.said.
 
     Returns:
         A task whose result is risorius.author.JointRig and what is odd, a sentence each.
@@ -183,7 +192,7 @@ def rig_task(
         progress: Callable[[float], None], cancelled: Callable[[], bool]
     ) -> tuple[native.JointRig, list[str]]:
         odd = face.check_shapes(shapes)
-        became = matching.assign(shapes.expressions, {})
+        became = matching.assign(shapes.expressions, said or {})
         odd += became.notes
         dna = face.make_shape_face(shapes, became.controls)
         options = author.RigOptions(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Protocol, cast
 
 import bpy
@@ -72,6 +72,8 @@ class Spoken(Protocol):
     """As in the metadata of a correctable clip."""
     built: str
     """The sounds of which the keys were made, as JSON."""
+    visemes: str
+    """The face's own visemes that it speaks by, as JSON: controls and weights by their names."""
     mark: str
     """Names the voice, whatever its action is called."""
 
@@ -92,6 +94,7 @@ def note(
     timing: clip_units.Timing,
     tolerance: float,
     intensity: float,
+    visemes: Mapping[str, native.Expression],
 ) -> None:
     """Keep with an action what its voice says.
 
@@ -101,6 +104,7 @@ def note(
         timing: where it lies.
         tolerance: of the action's keys; 0 where each sample has one.
         intensity: with which the clip was made.
+        visemes: of the face itself, with which it was made.
     """
     said = of(action)
     said.start, said.fps, said.rate = float(timing.frames(np.zeros(1))[0]), timing.rate, clip.rate
@@ -116,6 +120,7 @@ def note(
     ]
     _fill(said, sounds)
     said.built = _packed(sounds_of(action))
+    said.visemes = json.dumps({name: dict(one.weights) for name, one in visemes.items()})
     said.mark = uuid.uuid4().hex  # names change, and copies of an action are the same voice
 
 
@@ -248,6 +253,7 @@ class _Mouth:
         self.said = of(action)
         self._speech = native.part("speech")
         self._phoneme = native.part("speech.phones").Phoneme
+        self._visemes = _visemes_of(self.said)
         self._opened = np.array([float(n) for n in self.said.openness.split()] or [1000.0]) / 1000.0
 
     def names(self) -> list[str]:
@@ -278,8 +284,22 @@ class _Mouth:
             for s, end in zip(sounds, ends, strict=True)
         ]
         near = [p for p in phones if times[0] - _ROUND < p.end and p.begin < times[-1] + _ROUND]
-        found: dict[str, Floats] = self._speech.mouth(near, self._opened, times, said.intensity)
+        found: dict[str, Floats] = self._speech.mouth(
+            near, self._opened, times, said.intensity, self._visemes
+        )
         return found
+
+
+def _visemes_of(said: Spoken) -> dict[str, native.Expression]:
+    """The face's own visemes; none of a voice of before, or where somebody wrote into it."""
+    make = native.part("expressions").Expression
+    try:
+        return {
+            str(name): make(str(name), str(name), "viseme", "", {c: float(w[c]) for c in w})
+            for name, w in json.loads(said.visemes or "{}").items()
+        }
+    except (ValueError, TypeError, AttributeError):
+        return {}
 
 
 def _replace(

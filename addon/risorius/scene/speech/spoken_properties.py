@@ -106,6 +106,7 @@ class RISORIUS_PG_spoken(bpy.types.PropertyGroup):
     intensity: bpy.props.FloatProperty(options={"HIDDEN"})
     openness: bpy.props.StringProperty(options={"HIDDEN"})
     built: bpy.props.StringProperty(options={"HIDDEN"})
+    visemes: bpy.props.StringProperty(options={"HIDDEN"})
     mark: bpy.props.StringProperty(options={"HIDDEN"})
 
 

@@ -3,6 +3,7 @@
 # pyright: reportInvalidTypeForm=false
 """Operators that bring animation in from files and from other rigs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
@@ -13,7 +14,9 @@ from ...logic.base.names import printable
 from ...logic.base.sentences import told
 from ...scene.animation import range_properties, retarget_shape_keys
 from ...scene.base import parts, session
+from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import runtime
+from ...scene.shape_keys import unknown_curves
 from .. import words
 from ..blender_types import Context, FileHandler, ImportHelper, Item, Menu, Operator, Result
 from ..common import explain, face_controls, face_rig, shown_progress, system_path
@@ -188,7 +191,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         rate = render.fps, render.fps_base
         try:
             with shown_progress(context) as progress:
-                clip, notes, mapping = self._read(live)
+                clip, notes, mapping = self._read(context, live)
                 clip = self._ranged(context, clip, notes, mapping)
                 progress(0.4)
                 clip = self._adjusted(clip)
@@ -200,11 +203,14 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
                 self.place(context, clip, name, notes, self.use_eyes, whole)
         except native.user_errors() as error:
             render.fps, render.fps_base = rate
+            self._note_unknown(context, error)
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
         return {"FINISHED"}
 
-    def _read(self, live: runtime.Runtime) -> tuple["native.Clip", list[str], str]:
+    def _read(
+        self, context: Context, live: runtime.Runtime
+    ) -> tuple["native.Clip", list[str], str]:
         """The file as a clip of raw controls, lines on its curves, and the mapping used or ""."""
         if Path(self.filepath).suffix.lower() == CLIP_EXTENSION:
             return native.module().Clip.load(self.filepath), [], ""
@@ -224,7 +230,22 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
             full_value=self.full_value or None,
             angles=None if self.angles == "AUTO" else self.angles.lower(),
         )
+        used = mapping if self.mapping == "FILE" else report.mapping
+        self._keep_unknown(face_controls(context), str(used), report.unmapped)
         return clip, lines_of(report), report.mapping
+
+    def _keep_unknown(self, controls: ArmatureObject, mapping: str, names: Sequence[str]) -> None:
+        """Offer curves that the mapping does not know to be named."""
+        settings = {key: getattr(self, key) for key in self.properties.keys()}  # noqa: SIM118
+        plain = {k: v for k, v in settings.items() if isinstance(v, (str, int, float))}
+        found = unknown_curves.Unknown(mapping, {**plain, "filepath": self.filepath}, list(names))
+        unknown_curves.keep(controls, found)
+
+    def _note_unknown(self, context: Context, error: Exception) -> None:
+        """Of a file of which no mapping knows any curve all of them."""
+        names = getattr(error, "unknown", ())
+        if names:
+            self._keep_unknown(face_controls(context), "", names)
 
     def _ranged(
         self, context: Context, clip: "native.Clip", notes: list[str], mapping: str

@@ -28,6 +28,18 @@ def icon_of(path: Path) -> int:
     return icons[key].icon_id
 
 
+def load(path: Path) -> int:
+    """icon_of with the picture read now: a list that one searches does not wait for it.
+
+    Args:
+        path: of the picture.
+    """
+    icon = icon_of(path)
+    if icon:
+        _held["icons"][str(path)].icon_size  # noqa: B018  Blender reads the file when asked for it
+    return icon
+
+
 def forget() -> None:
     """Drop all icons: at the end, and where pictures are made anew."""
     if _held:

@@ -15,6 +15,7 @@ from ...scene.base.blender_types import MeshObject
 from ...scene.character import build, rig_placement
 from ...scene.file import shape_key_head
 from ...scene.frame import evaluate
+from ...scene.shape_keys import assigned
 from .. import words
 from ..background_work import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
@@ -89,14 +90,18 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         self.filepath = system_path(self.filepath)
         taken = shape_key_head.taken_with(context, item)
         family = shape_key_head.relatives_of(context, taken) if self.use_family else []
+        others = [*taken[1:], *family]
+        said = {k: v for one in (*others, item) for k, v in assigned.said_of(one).items()}
         try:
-            shapes = shape_key_head.shapes_of(context, item, [*taken[1:], *family], self.height)
+            shapes = shape_key_head.shapes_of(context, item, others, self.height, said)
         except native.user_errors() as error:
             self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
         self._head, self._shapes = item.name, shapes
         tolerance = self.tolerance if self.use_shapes else None
-        task = shape_key_head.rig_task(shapes, self.filepath, self.joints, self.levels, tolerance)
+        task = shape_key_head.rig_task(
+            shapes, self.filepath, self.joints, self.levels, tolerance, said
+        )
         self._task = task
         return self.begin(context, task)
 

@@ -12,6 +12,7 @@ from ...logic.animation.bezier_keys import TOLERANCE
 from ...logic.animation.clip_units import ClipError, Timing
 from ...logic.base.errors import FaceError
 from ...scene.animation import clip_actions, speech_task
+from ...scene.expressions import library, visemes
 from ...scene.speech import spoken_keys
 from .. import words
 from ..animation.operators import SOUNDS
@@ -52,6 +53,12 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
     use_accents: bpy.props.BoolProperty(
         name="Accents", description="Brows and head follow what is stressed", default=True
+    )
+    use_own_visemes: bpy.props.BoolProperty(
+        name="Visemes of the Face",
+        description="Mouths of the expressions beside its DNA file, or of the library of the "
+        "preferences, where they are there; off: those of Risorius",
+        default=True,
     )
     use_whole_frames: bpy.props.BoolProperty(
         name="Whole Frames",
@@ -96,6 +103,11 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         if self.transcript_text and text is None:
             self.report({"ERROR"}, words.say("There is no text {name}.", name=self.transcript_text))
             return {"CANCELLED"}
+        rig = face_rig(context)
+        found = visemes.of(rig, library.folder(context)) if self.use_own_visemes else None
+        self._own = found.own if found is not None else {}
+        for trouble in found.troubles[:3] if found is not None else ():
+            self.report({"WARNING"}, words.local(trouble))
         self._task = speech_task.SpeechTask(
             self.filepath,
             text.as_string() if text is not None else self.transcript,
@@ -104,10 +116,11 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             blinks=self.use_blinks,
             accents=self.use_accents,
             correctable=True,
+            library=self._own or None,
             # Made for these frames, not sampled at them: lips that meet shall meet on one.
             rate=clip_actions.frame_rate(context.scene) if self.use_whole_frames else 60.0,
         )
-        self._face = face_rig(context).session_uid
+        self._face = rig.session_uid
         return self.begin(context, self._task)
 
     def shown(self, share: int) -> str:
@@ -134,10 +147,13 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
                 context, task.result, name, notes, whole=self.use_whole_frames, tolerance=few
             )
             timing = self._timing(context, task.result)
-            spoken_keys.note(action, task.result, timing, few, self.intensity)
+            spoken_keys.note(action, task.result, timing, few, self.intensity, self._own)
         except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
+        if self._own:
+            text = "It speaks by {count} visemes of its own."
+            self.report({"INFO"}, words.say(text, count=len(self._own)))
         self._add_sound(context)
         return {"FINISHED"}
 
@@ -171,6 +187,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
             "use_blinks",
             "use_accents",
             "use_sound",
+            "use_own_visemes",
             "use_whole_frames",
             "use_every_frame",
         ):

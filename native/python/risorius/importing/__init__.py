@@ -22,7 +22,7 @@ from .mapping import (
 from .ranges import ANGLE_UNITS
 from .reading import KINDS, ROTATIONS, Imported, import_curves, import_file, read
 from .report import Report
-from .writing import csv_text, json_text, write_text
+from .writing import csv_text, json_text, mapping_with, write_text
 
 __all__ = [
     "ANGLE_UNITS",
@@ -44,6 +44,7 @@ __all__ = [
     "mapping_names",
     "mapping_text",
     "mapping_title",
+    "mapping_with",
     "process",
     "read",
     "write_text",

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..base.errors import RisoriusError
 
 
@@ -12,10 +14,18 @@ class AnimationFileError(RisoriusError):
     code = "animation_file"
 
     def __init__(
-        self, name: str, message: str, *, line: int | None = None, column: int | str | None = None
+        self,
+        name: str,
+        message: str,
+        *,
+        line: int | None = None,
+        column: int | str | None = None,
+        unknown: Sequence[str] = (),
     ) -> None:
-        """Args: the file; one clause; line from 1; column from 1, or its header."""
+        """Args: the file; one clause; line from 1; column from 1, or its header; curves that no
+        mapping knows, where that is the error."""
         self.name = name
+        self.unknown = tuple(unknown)
         self.line = line
         self.column = column
         place = "" if line is None else f", line {line}"

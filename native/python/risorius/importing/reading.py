@@ -160,6 +160,7 @@ class Imported:
             f"no mapping knows any of its {len(self.clip.names)} curves "
             f"({', '.join(self.clip.names[:4])} ...): give a mapping of your own (--mapping; "
             "Mapping in Blender)",
+            unknown=self.clip.names,
         )
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Clips as text that other software reads, and that reads back to the same bits."""
+"""Clips as text that other software reads, and that reads back to the same bits; mappings as text
+with rows of one's own."""
 
 from __future__ import annotations
 
@@ -7,12 +8,16 @@ import csv
 import io
 import json
 import os
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from ..anim.clip import Clip
+from ..base import toml
 from ..base.errors import ArgumentError
 from ..files import fileio
+from .mapping import load_mapping, mapping_names
 
 
 def csv_text(clip: Clip) -> str:
@@ -79,3 +84,38 @@ def _check_finite(clip: Clip, kind: str) -> None:
     if bad.size:
         name, frame = clip.names[bad[0, 0]], int(bad[0, 1])
         raise ArgumentError(f"{name}, frame {frame}: {kind} holds finite numbers only")
+
+
+def mapping_with(base: str, rows: Mapping[str, Mapping[str, float]]) -> str:
+    """The TOML of a mapping with further rows, as load_mapping reads it.
+
+    Args:
+        base: name of a mapping that comes with Risorius, path of another, or "" for none. Comments
+            of a file are left behind.
+        rows: curve -> {control, or @expression: weight}; an empty row leaves the curve out.
+
+    Raises:
+        MappingError: a base that cannot be read. TomlError.
+    """
+    if base:
+        load_mapping(base)  # says what is wrong with it
+    table: dict[str, Any] = {"base": base} if base in ("", *mapping_names()) else toml.read(base)
+    ignored = [*table.get("ignore", ()), *(name for name, row in rows.items() if not row)]
+    table["ignore"] = [name for name in dict.fromkeys(ignored) if not rows.get(name)]
+    table["rows"] = {**table.get("rows", {}), **{n: dict(row) for n, row in rows.items() if row}}
+    plain = [f"{key} = {_toml(v)}" for key, v in table.items() if v and not isinstance(v, dict)]
+    for key, value in table.items():
+        if value and isinstance(value, dict):
+            plain += ["", f"[{key}]", *(f"{_toml(k)} = {_toml(v)}" for k, v in value.items())]
+    return "\n".join([*plain, ""])
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        plain = value.encode("utf-8", "replace").decode()
+        return json.dumps(plain, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_toml(k)} = {_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    return str(value).lower()

@@ -24,14 +24,16 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from time import monotonic
 from typing import IO, Any
 
 import numpy as np
 
+from .. import expressions
 from ..anim.clip import Clip, Event
 from ..base.errors import ArgumentError, RisoriusError
+from ..expressions import Expression
 from . import speak
 from .audio import AudioError
 from .listening import Cancel, CancelledError, Progress
@@ -77,7 +79,7 @@ def speak_apart(
         "paths": [os.path.abspath(place) for place in sys.path],
         "path": os.fspath(path),
         "transcript": transcript,
-        "options": options,
+        "options": {**options, "library": _texts(options.get("library"))},
     }
     # Error messages of the process go into a file: a full pipe that nobody reads would block it.
     with tempfile.TemporaryFile() as said, _started(said) as process:
@@ -94,6 +96,19 @@ def speak_apart(
             raise RecogniserError(_how_it_ended(process, said))
         finally:
             process.kill()
+
+
+def _texts(library: Mapping[str, Expression] | None) -> dict[str, str] | None:
+    """Expressions as text, which goes through a pipe."""
+    if library is None:
+        return None
+    return {name: expressions.text_of(one) for name, one in library.items()}
+
+
+def _library(texts: Mapping[str, str] | None) -> dict[str, Expression] | None:
+    if texts is None:
+        return None
+    return {name: expressions.of_text(text)[name] for name, text in texts.items()}
 
 
 def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
@@ -211,7 +226,7 @@ def serve(task: dict[str, Any]) -> None:
             task["path"],
             task["transcript"],
             progress=lambda share: tell(share=share),
-            **task["options"],
+            **{**task["options"], "library": _library(task["options"]["library"])},
         )
         curves = base64.b64encode(np.ascontiguousarray(clip.curves, "<f4").tobytes())
         tell(

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 
 from ...base import toml
 from ...base.words import counted
 from ...controls import arkit, vocabulary
+from . import said as sayings
 
 PREFIX = vocabulary.PREFIX
+WORDS, PERSON = "words", "person"  # beside the names of vocabularies: who knew a name
 _SIDES = {"l": "L", "left": "L", "lf": "L", "lt": "L", "r": "R", "right": "R", "rt": "R"}
 
 
@@ -23,18 +25,21 @@ class Assignment:
 
     Attributes:
         controls: names of raw controls, without prefix, by shape. What nothing knows, or what
-            another shape has taken, is a control of the shape's own name.
+            another shape has taken, is a control of the shape's own name; a shape without a
+            control is left out.
         expressions: name of an expression by shape: visemes and shapes of the whole face, which
             have a control of their own that nothing but the expression moves.
         known: how many names are known, by the vocabulary that knows them; "" of words and of
             what a person said.
         notes: what is odd about the names, a sentence each.
+        by: who knew the name of each shape: a vocabulary, WORDS, PERSON, or "" where nobody did.
     """
 
     controls: dict[str, list[str]]
     expressions: dict[str, str]
     known: dict[str, int]
     notes: list[str]
+    by: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,16 @@ class _Guess:
     expression: str = ""
     rank: int = 4
     vocabulary: str = ""
+
+    @property
+    def by(self) -> str:
+        """See Assignment."""
+        return {0: PERSON, 3: WORDS}.get(self.rank, self.vocabulary)
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether a person said that it is nothing."""
+        return self.rank == 0 and not self.controls and not self.expression
 
 
 @cache
@@ -110,7 +125,7 @@ def _by_words(name: str) -> list[str]:
     return list(dict.fromkeys(c.replace("*", s) for c in found for s in sides))
 
 
-def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> Assignment:
+def assign(names: Iterable[str], edited: Mapping[str, sayings.Said]) -> Assignment:
     """The raw controls of each shape; each control belongs to one shape alone.
 
     What a person said comes first, then names of a vocabulary, then words (mouthOpen for jawOpen);
@@ -118,7 +133,10 @@ def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> Assig
 
     Args:
         names: of the shapes.
-        edited: what a person says of some of them: a control's name, or several.
+        edited: what a person says of some of them, as `said` has it.
+
+    Raises:
+        GivenError: a person said what is no control and no expression.
     """
     names = list(names)
     order = vocabulary.leading(names)
@@ -128,6 +146,8 @@ def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> Assig
     out = Assignment({name: [] for name in names}, {}, {}, [])
     for name in sorted(names, key=lambda n: (guesses[n].rank, len(guesses[n].controls))):
         found = guesses[name]
+        if found.is_left_out:
+            continue
         holder = next((holders[c] for c in found.controls if c in holders), None)
         controls = list(found.controls)
         if not controls or holder is not None:
@@ -138,16 +158,16 @@ def assign(names: Iterable[str], edited: Mapping[str, str | list[str]]) -> Assig
                 out.notes.append(_twice(name, holder, found.controls, controls[0]))
         out.controls[name] = controls
         holders |= dict.fromkeys(controls, name)
-    for found in guesses.values():
+    for name, found in guesses.items():
+        out.by[name] = found.by
         if found.rank < _Guess.rank:
             out.known[found.vocabulary] = out.known.get(found.vocabulary, 0) + 1
     out.notes.extend(_about(names, guesses))
     return out
 
 
-def _said(value: str | list[str]) -> _Guess:
-    values = [value] if isinstance(value, str) else value
-    return _Guess(tuple(v.removeprefix(PREFIX) for v in values), "", 0)
+def _said(value: sayings.Said) -> _Guess:
+    return _Guess(*sayings.meaning_of(value), 0)
 
 
 def _twice(name: str, holder: str, controls: Sequence[str], own: str) -> str:
@@ -177,6 +197,11 @@ def _about(names: Sequence[str], guesses: Mapping[str, _Guess]) -> list[str]:
             "expressions move this face, a capture of ARKit's units does not"
         ]
     return []
+
+
+def own_control(name: str) -> str:
+    """The control that a shape is where it is one of its own and no other has its name."""
+    return _own(name, "", ())
 
 
 def _own(name: str, expression: str, taken: Container[str]) -> str:

@@ -149,11 +149,13 @@ def combined_rows(
                 raise ShapeFileError(
                     f"{where}: combination {name}: one of {known} was expected, found {part!r}"
                 )
+        if any(not controls[part] for part in parts):
+            continue  # one of them is left out
         delta = together[name] - sum(shapes.expressions[part] for part in parts)
         for smaller, (_, part_delta) in zip(used, out, strict=True):
             if smaller < parts:
                 delta = delta - part_delta
-        named = {c for part in parts for c in (controls[part] or [part])}
+        named = {c for part in parts for c in controls[part]}
         numbers = sorted(i for i, full in enumerate(raw) if full.removeprefix(PREFIX) in named)
         used.append(parts)
         out.append((tuple(numbers), delta))
@@ -169,13 +171,19 @@ def make_shape_face(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> 
         shapes: the mesh and its expressions.
         controls: raw controls without prefix by expression, as matching.assign gives them. Of
             several each gets a part, and all of them together are the expression: those of a side
-            or a lip that side or lip, with a soft edge, others an equal share.
+            or a lip that side or lip, with a soft edge, others an equal share. An expression of
+            none is left out.
+
+    Raises:
+        ValueError: all are left out.
     """
     parts = shapes.parts or [
         FacePart("", 0, len(shapes.mesh.positions), (0, len(shapes.mesh.faces)), "head")
     ]
     positions = shapes.mesh.positions[: parts[0].stop]
     deltas = _by_control(shapes, controls)
+    if not deltas:
+        raise ArgumentError("an expression that is a control was expected: all are left out")
     dna = Dna()
     dna.name, dna.db_name = shapes.name, "risorius"
     dna.archetype, dna.gender = "other", "other"
@@ -275,7 +283,9 @@ def _part_mesh(mesh: ObjMesh, part: FacePart) -> ObjMesh:
 def _by_control(shapes: ShapeSet, controls: Mapping[str, Sequence[str]]) -> dict[str, Doubles]:
     out: dict[str, Doubles] = {}
     for expression, delta in shapes.expressions.items():
-        named = list(controls.get(expression) or [expression])
+        named = controls.get(expression, [expression])
+        if not named:
+            continue
         parts = _shares(shapes, delta, named)
         out |= {name: delta * part for name, part in zip(named, parts, strict=True)}
     return out

@@ -19,7 +19,7 @@ from ..heads.joining import join
 from ..heads.parts import Material, Wishes
 from ..levels import LodOptions
 from ..work import RigOptions
-from . import fbx, gltf
+from . import fbx, gltf, said
 from .fbx_head import read_fbx_head
 from .gltf_head import read_gltf_head
 from .matching import Assignment, assign
@@ -82,7 +82,7 @@ class Spec:
     source: dict[str, Any]
     options: RigOptions
     correctives: CorrectiveOptions = field(default_factory=lambda: CorrectiveOptions(most=0))
-    controls: dict[str, str | list[str]] = field(default_factory=dict)
+    controls: dict[str, said.Said] = field(default_factory=dict)
 
 
 @dataclass
@@ -163,10 +163,6 @@ def _read_tables(path: Path) -> dict[str, Any]:
     return {name: _checked(path, name, found) for name, found in table.items()}
 
 
-def _one_or_several(value: object) -> str | list[str]:
-    return list(_names(value)) if isinstance(value, list) else text(value)
-
-
 def _checked(path: Path, name: str, found: object) -> Any:
     """The value of a key of the file's top. Raises: ShapeFileError: none that is known."""
     place = name
@@ -180,7 +176,7 @@ def _checked(path: Path, name: str, found: object) -> Any:
         out = {}
         for key, value in found.items():
             place = f"{name}.{key}"
-            check = _one_or_several if name == "controls" else _TABLES[name].get(key)
+            check = said.check if name == said.TABLE else _TABLES[name].get(key)
             if check is None:
                 raise GivenError(f"one of {', '.join(_TABLES[name])} was expected")
             out[key] = check(value)

@@ -22,6 +22,7 @@ from ...author.correctives import (
 )
 from ...author.fitting import bounded
 from ...author.heads.textures import metadata_of, texture_folder, textures_of
+from ...author.input import said as sayings
 from ...author.input.library import about_library, library_files, library_folder
 from ...author.input.matching import Assignment
 from ...author.input.spec import Spec, read_face, read_spec
@@ -44,10 +45,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "author", help="make a joint rig from expressions", description=_DESCRIPTION
     )
-    parser.add_argument("spec", type=Path, metavar="HEAD")
+    parser.add_argument("spec", type=Path, nargs="?", metavar="HEAD")
     parser.add_argument("-o", "--out", type=Path, metavar="OUT.dna", help="the DNA file to write")
     parser.add_argument(
-        "--names", action="store_true", help="print which control each expression is, and end"
+        "--names",
+        nargs="?",
+        const="",
+        metavar="NAMES.toml",
+        help="print which control each expression is, and end; with a file, take its table "
+        "[controls] over that of the spec, and print it where there is no -o",
     )
     parser.add_argument(
         "--joints-only", action="store_true", help="no blend shapes, whatever the spec says"
@@ -94,16 +100,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    if args.out is None and not args.names:
-        raise CommandLineError("author: -o OUT.dna was expected")
-    spec = read_spec(args.spec)
+    spec = _spec(args)
     _size(spec, args)
     options, asked = _options(spec, args), _correctives(spec, args)
     read = read_face(spec)
     dna, became = read.dna, read.became
-    for sentence in read.odd:
-        print(f"note: {sentence}", file=sys.stderr if args.json else sys.stdout, flush=True)
-    if args.names:
+    is_table = args.names == "" or args.out is None
+    for sentence in read.odd:  # in a table as comments: it is a file of names as it is printed
+        mark, into = "# " * is_table, sys.stderr if args.json else sys.stdout
+        print(f"{mark}note: {sentence}", file=into, flush=True)
+    if is_table:
         print("\n".join(as_names(became)))
         return 0
     fileio.check_writable(args.out)
@@ -146,13 +152,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _spec(args: argparse.Namespace) -> Spec:
+    if args.spec is None and args.names:  # author --names SPEC.toml
+        args.spec, args.names = Path(args.names), ""
+    if args.spec is None:
+        raise CommandLineError("author: SPEC.toml was expected")
+    if args.out is None and args.names is None:
+        raise CommandLineError("author: -o OUT.dna was expected")
+    spec = read_spec(args.spec)
+    if args.names:
+        spec.controls |= sayings.read(args.names)
+    return spec
+
+
 def as_names(became: Assignment) -> list[str]:
-    """The table [controls] as it would be used, and beside it what else a name is."""
-    lines = ["[controls]"]
+    """The table [controls] as it would be used."""
+    lines = [f"[{sayings.TABLE}]"]
     for name, raw in became.controls.items():
-        line = f"{json.dumps(name)} = {json.dumps(raw[0] if len(raw) == 1 else raw)}"
         expression = became.expressions.get(name)
-        lines.append(f"{line}  # the expression {expression}" if expression else line)
+        value = f"@{expression}" if expression else raw[0] if len(raw) == 1 else raw
+        lines.append(sayings.row(name, value))
     known = sum(became.known.values())
     by = ", ".join(
         f"{count} of {vocabulary(name).title}" if name else f"{count} by words or [controls]"

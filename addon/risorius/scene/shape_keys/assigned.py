@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each shape key of a head becomes: by its name, or by what the user said.
+
+What the user said lies on the mesh as the text of the file that `risorius author --names` takes, so
+that saving and loading are copies of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import bpy
+
+from ... import native
+from ...language import tables
+from ...logic.character import slider_words
+from ..base import parts, saved, session
+from ..base.blender_types import MeshObject
+
+Said = str | list[str]  # as of risorius.author.input.said
+CONTROL, EXPRESSION, OWN, NOTHING, MUTED = "CONTROL", "EXPRESSION", "OWN", "NOTHING", "MUTED"
+WORDS = "WORDS"  # who knew a name, where no vocabulary did
+_UNITS, _CONTROLS = "arkit", "metahuman"  # vocabularies
+
+
+class Row(NamedTuple):
+    """What a shape key becomes.
+
+    Attributes:
+        key: its name.
+        kind: CONTROL: standard ones; EXPRESSION; OWN: a control of its own; NOTHING: the user left
+            it out; MUTED: it is muted, which leaves it out as well.
+        controls: raw controls without prefix.
+        expression: name of the expression, or "".
+        by: title of the vocabulary that knew the name, or WORDS; "" where nothing did.
+        is_known: whether its name is known, whatever the user said.
+        is_said: whether the user said what it is.
+        holder: another key that is already what its name or the user says; "" where none is.
+    """
+
+    key: str
+    kind: str
+    controls: tuple[str, ...]
+    expression: str
+    by: str
+    is_known: bool
+    is_said: bool
+    holder: str
+
+
+class Names(NamedTuple):
+    """The shape keys of a head: a row for each by its name, in their order."""
+
+    rows: Mapping[str, Row]
+
+    @property
+    def unknown(self) -> int:
+        """How many names nothing knows and nobody has said anything of."""
+        return sum(not row.is_known and not row.is_said for row in self.rows.values())
+
+
+def of(item: MeshObject) -> Names:
+    """What the shape keys of a head become.
+
+    Args:
+        item: has shape keys.
+    """
+    keys = parts.keys_there(item)
+    names = tuple(key.name for key in keys.key_blocks if key != keys.reference_key)
+    muted = frozenset(key.name for key in keys.key_blocks if key.mute)
+    return _names(names, muted, saved.text(item.data, parts.NAMES))
+
+
+def said_of(item: MeshObject) -> dict[str, Said]:
+    """What the user said of the keys of a mesh, by their names. Args: item  any mesh."""
+    return dict(_parsed(saved.text(item.data, parts.NAMES)))
+
+
+def put(item: MeshObject, said: Mapping[str, Said | None]) -> None:
+    """Keep what the user says of keys.
+
+    Args:
+        item: the head.
+        said: by the names of keys; None: its name decides again. Other keys stay as they are.
+
+    Raises:
+        GivenError: no ARKit unit, or no name for an expression; then nothing is kept.
+    """
+    module, table = native.part("author.input.said"), said_of(item)
+    for key, value in said.items():
+        if value is None:
+            table.pop(key, None)
+        else:
+            table[key] = module.check(value)
+    if table:
+        item.data[parts.NAMES] = module.text_of(table)
+    elif parts.NAMES in item.data:
+        del item.data[parts.NAMES]
+
+
+def own_control(key: str) -> str:
+    """The control that a key is where it is one of its own.
+
+    Args:
+        key: its name, which may hold letters that no control has.
+    """
+    found: str = native.part("author.input.matching").own_control(key)
+    return found
+
+
+@session.cached(("unregister",), 64)
+def _parsed(text: str) -> Mapping[str, Said]:
+    """The table of a text; nothing of one that somebody else wrote."""
+    if not text:
+        return {}
+    try:
+        found: dict[str, Said] = native.part("author.input.said").parse(text)
+    except (*native.user_errors(), ValueError):
+        return {}
+    return found
+
+
+@session.cached(("unregister",), 16)
+def _names(names: tuple[str, ...], muted: frozenset[str], text: str) -> Names:
+    matching = native.part("author.input.matching")
+    said = {key: value for key, value in _parsed(text).items() if key in names}
+    used = [name for name in names if name not in muted]
+    became, alone = matching.assign(used, said), matching.assign(names, {})
+    holders = {control: name for name, found in became.controls.items() for control in found}
+    rows = {}
+    for name in names:
+        by = alone.by[name]
+        controls = tuple(became.controls.get(name, ()))
+        expression = became.expressions.get(name, "")
+        kind = _kind(controls, expression) if name not in muted else MUTED
+        wanted = _wanted(said[name]) if name in said else matching.guess(name)
+        taken = (holders.get(control, name) for control in wanted) if kind == OWN else ()
+        holder = next((other for other in taken if other != name), "")
+        is_said = name in said
+        rows[name] = Row(name, kind, controls, expression, _title(by), bool(by), is_said, holder)
+    return Names(rows)
+
+
+def _wanted(said: Said) -> tuple[str, ...]:
+    """The controls that the user gave a key. Args: said  as the table has it."""
+    controls: tuple[str, ...] = native.part("author.input.said").meaning_of(said).controls
+    return controls
+
+
+def _kind(controls: tuple[str, ...], expression: str) -> str:
+    if expression:
+        return EXPRESSION
+    if not controls:
+        return NOTHING
+    return CONTROL if standard_controls().issuperset(controls) else OWN
+
+
+def _title(by: str) -> str:
+    if by in native.part("controls.vocabulary").names():
+        return str(native.part("controls.vocabulary").vocabulary(by).title)
+    return by and WORDS
+
+
+@session.cached(("unregister",), 1)
+def standard_controls() -> frozenset[str]:
+    """The raw controls of a standard face, without prefix."""
+    return frozenset(native.part("controls.vocabulary").vocabulary(_CONTROLS).meanings)
+
+
+class Choice(NamedTuple):
+    """Something that a key can be.
+
+    Attributes:
+        value: as the table says it.
+        label: for people, in English.
+        does: a sentence on what it does, in English, or "".
+        kind: CONTROL, EXPRESSION, or UNIT of an ARKit unit.
+    """
+
+    value: str
+    label: str
+    does: str
+    kind: str
+
+
+UNIT = "UNIT"
+
+
+@session.cached(("unregister",), 1)
+def choices() -> tuple[Choice, ...]:
+    """All that a key can be: ARKit's units, which most people know, controls, expressions."""
+    vocabulary, words = native.part("controls.vocabulary"), tables.controls()
+    units = [
+        Choice(f"={unit}", slider_words.title(unit), "", UNIT)
+        for unit in vocabulary.vocabulary(_UNITS).meanings
+    ]
+    controls = [
+        Choice(name, slider_words.title(name), words.tooltip(name), CONTROL)
+        for name in vocabulary.vocabulary(_CONTROLS).meanings
+    ]
+    own = native.part("expressions").load()
+    expressions = [
+        Choice(f"@{name}", one.label, one.description, EXPRESSION)
+        for name, one in own.items()
+        if one.weights
+    ]
+    return (*units, *controls, *expressions)
+
+
+@session.cached(("unregister",), 512)
+def unit_of(controls: tuple[str, ...]) -> str:
+    """The ARKit unit that these controls are, or "". Args: controls  without prefix."""
+    prefix, meant = native.part("controls.vocabulary").PREFIX, set(controls)
+    for unit, row in native.part("controls.arkit").mapping().items():
+        if {name.removeprefix(prefix) for name in row} == meant:
+            return str(unit)
+    return ""
+
+
+@session.cached(("unregister",), 1024)
+def weights_of(value: str) -> Mapping[str, float]:
+    """Raw controls of a standard face, with prefix, for what a key can be: for its picture.
+
+    Args:
+        value: of a Choice.
+    """
+    prefix = native.part("controls.vocabulary").PREFIX
+    if value.startswith("@"):
+        own = native.part("expressions").load().get(value[1:])
+        return dict(own.weights) if own is not None else {}
+    if value.startswith("="):
+        return dict(native.part("controls.arkit").mapping()[value[1:]])
+    return {prefix + value: 1.0}
+
+
+def is_editable(item: bpy.types.Object) -> bool:
+    """Whether what the user says can be kept: not on a mesh of another file."""
+    return item.data is not None and item.data.is_editable

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Words for what a shape key becomes, and which key of a head is the active one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import bpy
+
+from ...logic.character import slider_words
+from ...scene.base import parts, session
+from ...scene.base.blender_types import MeshObject
+from ...scene.shape_keys import assigned
+from .. import words
+
+
+def active_key(item: MeshObject) -> str:
+    """The name of the active shape key. Args: item  has keys."""
+    keys = parts.keys_there(item).key_blocks
+    return keys[min(item.active_shape_key_index or 0, len(keys) - 1)].name
+
+
+def label_of_choice(choice: assigned.Choice) -> str:
+    """What somebody looks for. Args: choice  one of assigned.choices."""
+    if choice.kind == assigned.UNIT:
+        return f"{choice.label} (ARKit)"
+    if choice.kind == assigned.EXPRESSION:
+        return words.say("Expression: {label}", label=words.say(choice.label))
+    return choice.label
+
+
+def tooltip_of_choice(choice: assigned.Choice) -> str:
+    """What it does, in the user's language. Args: choice  one of assigned.choices."""
+    return (bpy.app.translations.pgettext_tip(choice.does) or "") if choice.does else ""
+
+
+def becomes(row: assigned.Row) -> str:
+    """What a key becomes, in a few words. Args: row  of assigned.of."""
+    if row.kind == assigned.EXPRESSION:
+        own = _expressions().get(row.expression)
+        label = words.say(own.label) if own is not None else row.expression
+        return words.say("Expression: {label}", label=label)
+    if row.kind == assigned.CONTROL:
+        return words_of_controls(row.controls)
+    return words.say(
+        {
+            assigned.OWN: words.mark("A control of its own"),
+            assigned.NOTHING: words.mark("Left out"),
+            assigned.MUTED: words.mark("Muted: left out"),
+        }[row.kind]
+    )
+
+
+def who_knows(row: assigned.Row) -> str:
+    """A sentence on who says what a key is. Args: row  of assigned.of."""
+    if row.holder:
+        return words.say("{name} is that already: a control has one key.", name=row.holder)
+    if row.is_said:
+        return words.say("You said what this key is.")
+    if not row.by:
+        return words.say("No vocabulary knows this name.")
+    name = words.say("Words") if row.by == assigned.WORDS else row.by
+    return words.say("Known by: {name}", name=name)
+
+
+def words_of_controls(controls: tuple[str, ...]) -> str:
+    """The words of a control; of several the ARKit unit that they are, or the first and a number.
+
+    Args:
+        controls: without prefix.
+    """
+    if len(controls) == 1:
+        return slider_words.title(controls[0])
+    unit = assigned.unit_of(controls)
+    if unit:
+        return f"{slider_words.title(unit)} (ARKit)"
+    first = slider_words.title(controls[0])
+    return words.say("{name} and {count} more", name=first, count=len(controls) - 1)
+
+
+def words_of_value(value: str) -> str:
+    """What was chosen, in a few words. Args: value  of an assigned.Choice, "" for left out."""
+    if not value:
+        return words.say("Left out")
+    choice = next((c for c in assigned.choices() if c.value == value), None)
+    return label_of_choice(choice) if choice is not None else value
+
+
+def value_of(row: assigned.Row) -> assigned.Said:
+    """What a key becomes, as a file of names says it. Args: row  of assigned.of."""
+    if row.expression:
+        return f"@{row.expression}"
+    return row.controls[0] if len(row.controls) == 1 else list(row.controls)
+
+
+def sample_of(row: assigned.Row) -> str:
+    """What the sample man shows for a key, as assigned.Choice says it; "" where he has no such.
+
+    Args:
+        row: of assigned.of.
+    """
+    if row.kind == assigned.EXPRESSION:
+        return f"@{row.expression}" if row.expression in _expressions() else ""
+    if row.kind != assigned.CONTROL:
+        return ""
+    unit = assigned.unit_of(row.controls)
+    return f"={unit}" if unit else next(iter(row.controls))
+
+
+@session.cached(("unregister",), 1)
+def _expressions() -> Mapping[str, assigned.Choice]:
+    return {c.value[1:]: c for c in assigned.choices() if c.kind == assigned.EXPRESSION}
