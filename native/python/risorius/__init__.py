@@ -115,3 +115,5 @@ __all__ = [
     "solve_clip",
     "solve_drag",
 ]
+
+from ._shim import JointChain, Skin

@@ -137,13 +137,13 @@ def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
 
 
 def plain_driver(
-    curve: bpy.types.FCurve, rig: ArmatureObject, data_path: str, name: str = "var"
+    curve: bpy.types.FCurve, owner: bpy.types.Object, data_path: str, name: str = "var"
 ) -> None:
-    """Make an F-curve follow one property of the rig, without any expression.
+    """Make an F-curve follow one property of an object, without any expression.
 
     Args:
         curve: of a new driver that has no variables.
-        rig: the object that has the property.
+        owner: the object that has the property.
         data_path: from the object to one number.
         name: of the driver's variable.
     """
@@ -154,5 +154,5 @@ def plain_driver(
     variable.name = name
     variable.type = "SINGLE_PROP"
     variable.targets[0].id_type = "OBJECT"
-    variable.targets[0].id = rig
+    variable.targets[0].id = owner
     variable.targets[0].data_path = data_path

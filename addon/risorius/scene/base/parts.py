@@ -32,6 +32,9 @@ LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: its number in the DNA
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
+FINISHED = "risorius_finished"  # on a mesh object: it is in Direct mode now, see direct.py
+SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" where Direct is not wanted
+VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
 REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys
 KEY_ORDER = "risorius_key_order"  # on a Key in LIVE mode: their order, as channels
@@ -106,6 +109,19 @@ def keys_there(item: MeshObject) -> bpy.types.Key:
     key = item.data.shape_keys
     assert key is not None
     return key
+
+
+def carrier_of(rig: ArmatureObject) -> bpy.types.Object:
+    """The object whose array MAPS the drivers of a character's materials read.
+
+    It is a mesh of the character: each update of the deforming armature copies all its bones.
+    Characters of older files have the array on the deforming armature alone.
+
+    Args:
+        rig: deforming armature.
+    """
+    found = saved.item(rig, VALUES)
+    return rig if found is None or found.get(RIG) != rig or MAPS not in found else found
 
 
 def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:

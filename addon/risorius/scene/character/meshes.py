@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ... import native
 from ...logic.base.space import Space
 from ...logic.character import plans, user_edits
-from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
+from ...logic.character.plans import LIVE_KEY
 from ..base import compat, drivers, parts, saved
 from ..base.blender_types import ArmatureObject, MeshObject
 from .armatures import lock_place
@@ -96,17 +96,6 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
         edit.to_mesh(item.data)
     finally:
         edit.free()
-
-
-def automatic_mode(target_count: int, vertex_count: int, all_targets: int) -> str:
-    """KEYS where real keys are cheap enough each frame, else LIVE.
-
-    Args:
-        target_count, vertex_count: of the mesh.
-        all_targets: of all meshes of the character.
-    """
-    few = target_count * vertex_count < AUTO_LIMIT and all_targets <= AUTO_KEYS
-    return "KEYS" if few else "LIVE"
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
@@ -346,14 +335,21 @@ def _to_live(
     elif parts.REAL in key:
         del key[parts.REAL]
     if live_block(item) is None:
-        block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
-        block.value = 1.0
-        block.interpolation = _LIVE_MARK
-        # What is edited in it is lost at the next change of a control: nobody shall get there
-        # by entering edit mode.
-        block.lock_shape = True
-        if item.active_shape_key == block:
-            item.active_shape_key_index = 0
+        add_live_key(item)
+
+
+def add_live_key(item: MeshObject) -> None:
+    """Add the key that bears the channel sum, or finished positions. Args: item  the mesh."""
+    if item.data.shape_keys is None:
+        item.shape_key_add(name="Basis", from_mix=False)
+    block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
+    block.value = 1.0
+    block.interpolation = _LIVE_MARK
+    # Edits in it are lost at the next change of a control: nobody shall get there by entering
+    # edit mode.
+    block.lock_shape = True
+    item.active_shape_key_index = 0
+    item[parts.MODE] = "LIVE"
 
 
 def touched(

@@ -16,16 +16,8 @@ from ..animation import layer_mixing, layers, tweak_guard
 from ..base import compat, console, last_written, parts, session, sharing
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import board, outlines, rig_placement, runtime, shown_keys
-from ..frame import (
-    caches,
-    channel_preview,
-    controls_ahead,
-    evaluate,
-    joint_readings,
-    lateness,
-    look_masks,
-    timing,
-)
+from ..skinning import caches, conditions, direct, ordinary, skins
+from ..frame import channel_preview, controls_ahead, evaluate, joint_readings, lateness, look_masks, timing
 from ..lod import lods
 from ..see_why import heat
 from ..upkeep import applied_transforms, bone_edits, duplicates, migrations, repair
@@ -69,6 +61,7 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
     if depsgraph is not None:
         timing.evaluated()
         evaluate.after_frame(depsgraph)
+    conditions.end_frame()
 
 
 def _is_rendered() -> bool:
@@ -113,10 +106,15 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
         _notice_copies(depsgraph.updates)
         # A change of a colour space is among the updates, one of pixels is not.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
+        skins.forget(conditions.note_updates(depsgraph))
         waiting = set(_mended)
         _mended.clear()
         edited = _edited(depsgraph)
-        edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]
+        edited += [
+            rig
+            for rig in parts.rigs()
+            if rig not in edited and (rig.session_uid in waiting or conditions.stale(rig))
+        ]
         if edited:
             timing.begin()
         for rig in edited:
@@ -194,7 +192,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        last_written.forget()
+        last_written.forget()  # the rest pose of the bones with it
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
@@ -294,6 +292,7 @@ def _before_save(*_arguments: object) -> None:
         refresh()
     repair.remove_dead()
     console.say(*sharing.share())
+    ordinary.take_on(parts.rigs())
 
 
 @persistent
@@ -301,6 +300,7 @@ def _saved(*_arguments: object) -> None:
     """What no file shall have, the session has again."""
     if native.problem():
         return
+    ordinary.take_off(parts.rigs())
     if look_masks.give_back():
         refresh()
     layer = current_context().view_layer

@@ -20,19 +20,10 @@ from ... import native
 from ..animation import layers
 from ..base import drivers, last_written, parts, saved, session
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
-from ..character import rig_placement, runtime
+from ..character import rig_placement, runtime, values
 from ..lod import lods
-from . import (
-    bone_writer,
-    channel_preview,
-    controls_ahead,
-    inputs,
-    joint_readings,
-    lateness,
-    live_keys,
-    look_masks,
-    timing,
-)
+from ..skinning import bone_writer, conditions, direct, live_keys
+from . import channel_preview, controls_ahead, inputs, joint_readings, lateness, look_masks, timing
 
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
 # Deforming armature -> what was done before this frame.
@@ -215,8 +206,12 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     test = channel_preview.override(rig, raw, depsgraph.scene)
     rendering = moment is Moment.RENDER or depsgraph.mode == "RENDER"
     look = look_masks.for_frame(rig, rendering)
-    state = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
-    anew = moment is Moment.ANEW
+    # A mode is not changed in the middle of a render: Blender's graph of it would be built anew.
+    plan = (rendering and conditions.known(rig)) or conditions.of(rig, live)
+    changed = not rendering and direct.settle(rig, live, plan)
+    shown = (test, look, plan)
+    state = (raw.tobytes(), lod, shown, *((name, *turn) for name, turn in turns.items()))
+    anew = moment is Moment.ANEW or changed
     if not last_written.is_new(last_written.inputs, rig, state) and not anew:
         timing.looked(times[0])
         return False
@@ -225,17 +220,24 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     look_masks.apply(look, pose, live, lod)
     channel_preview.apply(test, pose.blend_shapes)
     times.append(perf_counter())
-    keyed = joint_readings.of(rig, live).keyed
-    taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
-    last_written.note_refusal(rig, taken)
-    if not taken:
-        return False  # channels and maps shall not move without the bones
-    _write_values(rig, pose)
+    if plan.posed:
+        keyed = joint_readings.of(rig, live).keyed
+        taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
+        last_written.note_refusal(rig, taken)
+        if not taken:
+            return False  # channels and maps shall not move without the bones
+        rig.update_tag(refresh={"OBJECT"})
+    values.write(rig, pose.animated_maps, pose.blend_shapes)
     times.append(perf_counter())
+    shape = direct.Shape(pose.joints, pose.blend_shapes, turns)
+    frame = direct.begin(rig, live, shape) if plan.direct else None
     for item in parts.meshes_of(rig):
-        if lods.shows(item, lod):
+        if not lods.shows(item, lod):
+            continue
+        if frame is not None and item.session_uid in plan.direct:
+            direct.write(item, frame, anew)
+        else:
             live_keys.write(item, live, pose.blend_shapes, anew, moment in _BEFORE_FRAME)
-    rig.update_tag(refresh={"OBJECT"})
     times.append(perf_counter())
     timing.add(times)
     return True
@@ -270,10 +272,3 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
     """Objects of a character, an override, that Blender lets nobody write to."""
     return [item for item in (rig, *parts.meshes_of(rig)) if last_written.is_refused(item)]
-
-
-def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:
-    """Write channels and maps to the array properties that drivers read."""
-    for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
-        if len(values) and saved.length(rig, name) == len(values):
-            rig[name][:] = values.tolist()

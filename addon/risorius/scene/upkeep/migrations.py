@@ -10,7 +10,8 @@ from __future__ import annotations
 from ..animation import actions
 from ..base import form, parts, session
 from ..base.blender_types import ArmatureObject
-from ..frame import caches, joint_turns
+from ..skinning import caches
+from ..frame import joint_turns
 
 # Session uids of characters that something was said of.
 _said: set[int] = session.keep("migrations.said", set, ("load",))

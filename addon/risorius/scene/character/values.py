@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The arrays of channels and animated maps that drivers of a character read."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import compat, parts, saved
+from ..base.blender_types import ArmatureObject, MeshObject
+from ..material import materials
+
+
+def write(
+    rig: ArmatureObject, maps: NDArray[np.float32], channels: NDArray[np.float32]
+) -> None:
+    """Write the arrays of a face.
+
+    Args:
+        rig: deforming armature; nothing tells Blender of it.
+        maps: float32[M], of the animated maps.
+        channels: float32[C].
+    """
+    _fill(rig, parts.CHANNELS, channels)
+    _fill(rig, parts.MAPS, maps)
+    carrier = parts.carrier_of(rig)
+    if carrier != rig and _fill(carrier, parts.MAPS, maps):
+        carrier.update_tag(refresh={"OBJECT"})
+
+
+def _fill(owner: ArmatureObject | MeshObject, name: str, values: NDArray[np.float32]) -> bool:
+    fits = len(values) > 0 and saved.length(owner, name) == len(values)
+    if fits:
+        owner[name][:] = values.tolist()
+    return fits
+
+
+def carry(rig: ArmatureObject, item: MeshObject) -> None:
+    """Let the materials of a character read animated maps from one of its meshes from now on.
+
+    Args:
+        rig: deforming armature.
+        item: the mesh; Blender has to evaluate it before drivers are pointed at it.
+    """
+    item[parts.MAPS] = rig[parts.MAPS].to_list()
+    item.property_overridable_library_set(f'["{parts.MAPS}"]', True)
+    parts.point(rig, parts.VALUES, item)
+
+
+def point_materials(rig: ArmatureObject, owner: ArmatureObject | MeshObject) -> None:
+    """Point the drivers of a character's materials at the object that bears their values.
+
+    Args:
+        rig: deforming armature.
+        owner: that, or the mesh that carries its maps.
+    """
+    for item in parts.meshes_of(rig):
+        for slot in item.material_slots:
+            for curve in materials.map_drivers(slot.material):
+                for variable in compat.driver_of(curve).variables:
+                    for target in variable.targets:
+                        if target.id != owner:
+                            target.id = owner

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bones and skin weights of a face as Blender has them, compiled for the native skinning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import parts, session
+from ..base.blender_types import ArmatureObject, MeshObject
+from ..character import meshes
+
+_SAMPLES = 16  # vertices whose weights tell that undo left a mesh as it was
+
+
+@dataclass
+class Bones:
+    """The bones of a deforming armature.
+
+    Attributes:
+        names: bone -> its place among the pose's bones.
+        chain: risorius.JointChain of them.
+        location, rotation, scale: float32[B, 3 or 4 (w x y z)] of all bones; the evaluator writes
+            the rows of its joints.
+    """
+
+    names: dict[str, int]
+    chain: native.JointChain
+    location: NDArray[np.float32]
+    rotation: NDArray[np.float32]
+    scale: NDArray[np.float32]
+
+
+@dataclass
+class Skin:
+    """The skin of a mesh.
+
+    Attributes:
+        skin: risorius.Skin of its vertex groups.
+        base: float32[V, 3], its reference key.
+        used: int64, the bones that move it.
+        mark: see _mark.
+    """
+
+    skin: native.Skin
+    base: NDArray[np.float32]
+    used: NDArray[np.int64]
+    mark: tuple[object, ...]
+
+
+# Deforming armature -> Bones; mesh object -> Skin.
+_bones: dict[int, Bones] = session.table("skins.bones", ("rewrite", "undo", "load"))
+_skins: dict[int, Skin] = session.table("skins.skins", ("load",))
+_unsure: set[int] = session.keep("skins.unsure", set, ("load",))
+
+
+@session.at("undo")
+def doubt() -> None:
+    """After undo a skin is compared with its mesh before it is used again."""
+    _unsure.update(_skins)
+
+
+def forget(uids: set[int]) -> None:
+    """Meshes were edited. Args: uids  of the mesh objects."""
+    for uid in uids:
+        _skins.pop(uid, None)
+
+
+def forget_bones(rig: ArmatureObject) -> None:
+    """Bones of an armature were edited. Args: rig  deforming armature."""
+    _bones.pop(rig.session_uid, None)
+
+
+def bones_of(rig: ArmatureObject) -> Bones:
+    """The bones of an armature as they are now. Args: rig  deforming armature."""
+    kept = _bones.get(rig.session_uid)
+    if kept is None or len(kept.names) != len(rig.pose.bones):
+        kept = _bones[rig.session_uid] = _read_bones(rig)
+    return kept
+
+
+def of(item: MeshObject, bones: Bones) -> Skin:
+    """The skin of a mesh as it is now.
+
+    Args:
+        item: the mesh object.
+        bones: those of its deforming armature.
+    """
+    uid = item.session_uid
+    kept = _skins.get(uid)
+    if kept is not None and uid in _unsure and kept.mark != _mark(item):
+        kept = None
+    _unsure.discard(uid)
+    if kept is None:
+        kept = _skins[uid] = _read_skin(item, bones)
+    return kept
+
+
+def _read_bones(rig: ArmatureObject) -> Bones:
+    rests, posed = rig.data.bones, rig.pose.bones
+    names = {bone.name: place for place, bone in enumerate(posed)}
+    rest = np.empty((len(rests), 4, 4), np.float32)
+    rests.foreach_get("matrix_local", rest.ravel())
+    rest = rest.transpose(0, 2, 1)  # Blender's columns lie one after the other
+    order = [names[bone.name] for bone in rests]
+    parents = np.full(len(posed), -1, np.int32)
+    for place, bone in zip(order, rests, strict=True):
+        if bone.parent is not None:
+            parents[place] = names[bone.parent.name]
+    sorted_rest = np.empty_like(rest)
+    sorted_rest[order] = rest
+    location = np.zeros((len(posed), 3), np.float32)
+    rotation = np.tile(np.array([1, 0, 0, 0], np.float32), (len(posed), 1))
+    scale = np.ones((len(posed), 3), np.float32)
+    basis = np.empty((len(posed), 16), np.float32)
+    posed.foreach_get("matrix_basis", basis.ravel())
+    straight = np.eye(4, dtype=np.float32).ravel()
+    for place in np.flatnonzero((basis != straight).any(axis=1)).tolist():
+        matrix = Matrix(basis[place].reshape(4, 4).T.tolist())
+        moved, turned, sized = matrix.decompose()
+        location[place], rotation[place], scale[place] = moved, turned, sized
+    chain = native.module().JointChain(parents, sorted_rest)
+    return Bones(names, chain, location, rotation, scale)
+
+
+def _read_skin(item: MeshObject, bones: Bones) -> Skin:
+    place_of = [bones.names.get(group.name, -1) for group in item.vertex_groups]
+    vertices = item.data.vertices
+    held = [[(e.group, e.weight) for e in vertex.groups] for vertex in vertices]
+    counts = np.fromiter(map(len, held), np.int64, len(held))
+    pairs = np.array([pair for row in held for pair in row], np.float64).reshape(-1, 2)
+    groups = pairs[:, 0].astype(np.int64)
+    places = np.full(max(len(place_of), int(groups.max(initial=-1)) + 1), -1, np.int64)
+    places[: len(place_of)] = place_of
+    found = places[groups]
+    kept = (found >= 0) & (pairs[:, 1] > 0.0)
+    owner = np.repeat(np.arange(len(held)), counts)[kept]
+    offsets = np.zeros(len(held) + 1, np.uint32)
+    np.cumsum(np.bincount(owner, minlength=len(held)), out=offsets[1:])
+    used = found[kept]
+    skin = native.module().Skin(
+        len(held),
+        offsets,
+        used.astype(np.uint32),
+        pairs[kept, 1].astype(np.float32),
+        len(bones.names),
+    )
+    return Skin(skin, meshes.basis_of(item), np.unique(used), _mark(item))
+
+
+def _mark(item: MeshObject) -> tuple[object, ...]:
+    """What differs once undo has read a mesh anew: addresses and weights of some vertices."""
+    data = item.data
+    count = len(data.vertices)
+    rows: list[object] = [count, tuple(group.name for group in item.vertex_groups)]
+    for place in range(0, count, max(1, count // _SAMPLES)):
+        groups = data.vertices[place].groups
+        rows.append(tuple((e.as_pointer(), e.group, e.weight) for e in groups))
+    return tuple(rows)
