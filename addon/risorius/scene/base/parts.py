@@ -34,6 +34,7 @@ HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the f
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
 FINISHED = "risorius_finished"  # on a mesh object: it is in Direct mode now, see direct.py
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" where Direct is not wanted
+JOINTS_SHOWN = "risorius_joints_shown"  # on the same: its joints were shown in an older file
 VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
 REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys

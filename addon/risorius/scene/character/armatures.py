@@ -251,6 +251,13 @@ def joints_are_shown(rig: ArmatureObject) -> bool:
     return not rig.hide_viewport and any(c.is_visible for c in rig.data.collections_all)
 
 
+def hide_joints(rig: ArmatureObject) -> None:
+    """Hide the bones of a deforming armature; their names and selection stay."""
+    for shelf in rig.data.collections_all:
+        shelf.is_visible = False
+    rig.pop(parts.JOINTS_SHOWN, None)
+
+
 def lock_place(item: bpy.types.Object) -> None:
     """Let the user's hand not move an object by accident."""
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)

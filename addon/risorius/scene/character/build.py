@@ -140,8 +140,7 @@ def _build(
         parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
         built.append(item)
         progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
-    if built:
-        values.carry(rig, max(built, key=lambda item: len(item.data.vertices)))
+    values.carry_on_largest(rig)
     warnings = []
     # Drivers are made only after the properties that they read have reached the evaluated
     # copies: one that was evaluated before stays invalid for ever.

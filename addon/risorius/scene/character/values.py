@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import bpy
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,9 +12,7 @@ from ..base.blender_types import ArmatureObject, MeshObject
 from ..material import materials
 
 
-def write(
-    rig: ArmatureObject, maps: NDArray[np.float32], channels: NDArray[np.float32]
-) -> None:
+def write(rig: ArmatureObject, maps: NDArray[np.float32], channels: NDArray[np.float32]) -> None:
     """Write the arrays of a face.
 
     Args:
@@ -28,7 +27,7 @@ def write(
         carrier.update_tag(refresh={"OBJECT"})
 
 
-def _fill(owner: ArmatureObject | MeshObject, name: str, values: NDArray[np.float32]) -> bool:
+def _fill(owner: bpy.types.Object, name: str, values: NDArray[np.float32]) -> bool:
     fits = len(values) > 0 and saved.length(owner, name) == len(values)
     if fits:
         owner[name][:] = values.tolist()
@@ -47,7 +46,14 @@ def carry(rig: ArmatureObject, item: MeshObject) -> None:
     parts.point(rig, parts.VALUES, item)
 
 
-def point_materials(rig: ArmatureObject, owner: ArmatureObject | MeshObject) -> None:
+def carry_on_largest(rig: ArmatureObject) -> None:
+    """Let the largest mesh of a character carry its maps. Args: rig  deforming armature."""
+    items = [item for item in parts.meshes_of(rig) if item.library is None]
+    if items:
+        carry(rig, max(items, key=lambda item: len(item.data.vertices)))
+
+
+def point_materials(rig: ArmatureObject, owner: bpy.types.Object) -> None:
     """Point the drivers of a character's materials at the object that bears their values.
 
     Args:

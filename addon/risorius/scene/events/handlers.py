@@ -16,10 +16,18 @@ from ..animation import layer_mixing, layers, tweak_guard
 from ..base import compat, console, last_written, parts, session, sharing
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import board, outlines, rig_placement, runtime, shown_keys
-from ..skinning import caches, conditions, direct, ordinary, skins
-from ..frame import channel_preview, controls_ahead, evaluate, joint_readings, lateness, look_masks, timing
+from ..frame import (
+    channel_preview,
+    controls_ahead,
+    evaluate,
+    joint_readings,
+    lateness,
+    look_masks,
+    timing,
+)
 from ..lod import lods
 from ..see_why import heat
+from ..skinning import caches, conditions, ordinary, skins
 from ..upkeep import applied_transforms, bone_edits, duplicates, migrations, repair
 
 

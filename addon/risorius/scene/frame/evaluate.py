@@ -18,7 +18,7 @@ import numpy as np
 
 from ... import native
 from ..animation import layers
-from ..base import drivers, last_written, parts, saved, session
+from ..base import drivers, last_written, parts, session
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
 from ..character import rig_placement, runtime, values
 from ..lod import lods
@@ -208,7 +208,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     look = look_masks.for_frame(rig, rendering)
     # A mode is not changed in the middle of a render: Blender's graph of it would be built anew.
     plan = (rendering and conditions.known(rig)) or conditions.of(rig, live)
-    changed = not rendering and direct.settle(rig, live, plan)
+    changed = not rendering and direct.settle(rig, plan)
     shown = (test, look, plan)
     state = (raw.tobytes(), lod, shown, *((name, *turn) for name, turn in turns.items()))
     anew = moment is Moment.ANEW or changed

@@ -7,18 +7,19 @@ A Plan is made when the file changes and kept while frames play.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
 from ...logic.base.sentences import Sentence, told
-from ..base import drivers, form, parts, saved, session
+from ..base import compat, drivers, parts, saved, session
 from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 from ..character import armatures, meshes, runtime
 from . import live_keys
 
+_PLACES = ("location", "rotation", "scale", "delta")  # how data paths of an object's place begin
 _STRAIGHT = 1e-6  # of a matrix's elements, from which a mesh counts as moved against its rig
 _FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
 
@@ -45,7 +46,6 @@ class _Kept:
     plan: Plan
     signature: tuple[object, ...]
     is_fresh: bool = True
-    holders: dict[int, tuple[object, ...]] = field(default_factory=dict)
 
 
 # Deforming armature -> its plan.
@@ -101,6 +101,43 @@ def end_frame() -> None:
     _written.clear()
 
 
+@dataclass
+class _Edits:
+    """What an edit concerns.
+
+    Attributes:
+        meshes: session uids of meshes of characters that somebody else edited.
+        rigs: session uids of edited deforming armatures, and of their data.
+        foreign: whether an object was edited that belongs to no character.
+    """
+
+    meshes: set[int] = field(default_factory=set)
+    rigs: set[int] = field(default_factory=set)
+    foreign: bool = False
+
+    def add(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.ID) -> None:
+        """Args: update  of the datablock; item  the original of that."""
+        if isinstance(item, bpy.types.Armature):
+            self.rigs.add(item.session_uid)
+        elif isinstance(item, bpy.types.Object):
+            self._add_object(update, item)
+        elif isinstance(item, _FOREIGN_KINDS):
+            self.foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+
+    def _add_object(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.Object) -> None:
+        uid = item.session_uid
+        if parts.MESH in item and parts.RIG in item:
+            ours = uid in _written
+            _written.discard(uid)
+            if not ours and (update.is_updated_geometry or update.is_updated_transform):
+                self.meshes.add(uid)
+        elif parts.CONTROLS in item:
+            if update.is_updated_geometry:
+                self.rigs.add(uid)
+        elif parts.RIG not in item:
+            self.foreign = True
+
+
 def note_updates(depsgraph: Depsgraph) -> set[int]:
     """Look which plans an edit may have changed.
 
@@ -110,33 +147,20 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
     Returns:
         Session uids of meshes that somebody else than this add-on edited.
     """
-    edited, foreign, touched = set[int](), False, set[int]()
+    edits = _Edits()
     for update in depsgraph.updates:
         item = update.id.original if update.id is not None else None
-        if isinstance(item, bpy.types.Armature):
-            touched.add(item.session_uid)
-        elif isinstance(item, bpy.types.Object):
-            if parts.MESH in item and parts.RIG in item:
-                if item.session_uid in _written:
-                    _written.discard(item.session_uid)
-                elif update.is_updated_geometry or update.is_updated_transform:
-                    edited.add(item.session_uid)
-            elif item.type == "ARMATURE" and parts.CONTROLS in item:
-                if update.is_updated_geometry:
-                    touched.add(item.session_uid)
-            elif parts.RIG not in item:
-                foreign = True
-        elif isinstance(item, _FOREIGN_KINDS):
-            foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+        if item is not None:
+            edits.add(update, item)
     for rig in parts.rigs():
         kept = _kept.get(rig.session_uid)
         if kept is None or not kept.is_fresh:
             continue
-        own = {item.session_uid for item in parts.meshes_of(rig)}
-        if foreign or touched & {rig.session_uid, rig.data.session_uid} or own & edited:
-            kept.is_fresh = False
+        own = {item.session_uid for item in parts.meshes_of(rig)} & edits.meshes
+        armature = edits.rigs & {rig.session_uid, rig.data.session_uid}
+        kept.is_fresh = not (edits.foreign or armature or own)
     look_quickly()
-    return edited
+    return edits.meshes
 
 
 def look_quickly() -> None:
@@ -273,20 +297,16 @@ def _standing(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
     """Whether a mesh stands where its rig stands."""
     place = np.array(item.matrix_parent_inverse @ item.matrix_basis)
     moved = np.abs(place - np.eye(4)).max() > _STRAIGHT
-    if item.parent != rig or item.parent_type != "OBJECT" or moved or len(item.constraints):
-        yield told("{mesh} was moved against {rig}.", mesh=item.name, rig=rig.name)
-    elif item.animation_data is not None and any(
-        curve.data_path.startswith(("location", "rotation", "scale", "delta"))
-        for curve in _curves(item)
-    ):
+    moved = moved or item.parent != rig or item.parent_type != "OBJECT" or len(item.constraints)
+    if moved or any(curve.data_path.startswith(_PLACES) for curve in _curves(item)):
         yield told("{mesh} was moved against {rig}.", mesh=item.name, rig=rig.name)
 
 
 def _curves(owner: bpy.types.Object | bpy.types.Key) -> Iterator[bpy.types.FCurve]:
     data = owner.animation_data
     if data is not None:
-        for action in drivers.compat.played_actions(owner):
-            yield from drivers.compat.curves_for(action, owner)
+        for action in compat.played_actions(owner):
+            yield from compat.curves_for(action, owner)
         yield from data.drivers
 
 
@@ -336,7 +356,7 @@ def _keys(
         if key is not None or live.morph(number).channel_indices.size:
             yield told("{mesh} has real shape keys.", mesh=item.name)
         return
-    others = (b for b in key.key_blocks if b != block and b != key.reference_key)
+    others = (b for b in key.key_blocks if b not in (block, key.reference_key))
     used = [b for b in others if b.value and not b.mute]
     pinned = item.show_only_shape_key or not key.use_relative
     if used or pinned or parts.REAL in key or next(_curves(key), None) is not None:
@@ -353,13 +373,13 @@ def _readers(rig: ArmatureObject) -> Iterator[Sentence]:
     controls = parts.controls_there(rig)
     if rig.select_get():
         yield told("{rig} is selected.", rig=rig.name)
-    if form.version_of(controls) >= form.PRESENT and armatures.joints_are_shown(rig):
+    if parts.JOINTS_SHOWN not in rig and armatures.joints_are_shown(rig):
         yield told("The joints of {rig} are shown.", rig=rig.name)
     own = {controls, *parts.meshes_of(rig)}
-    for user in bpy.data.user_map(subset={rig})[rig]:
+    for user in bpy.data.user_map(subset=[rig])[rig]:
         if isinstance(user, (bpy.types.Scene, bpy.types.Collection)):
             continue
-        if user in own and not _reads_bones(user, rig):
+        if isinstance(user, bpy.types.Object) and user in own and not _reads_bones(user, rig):
             continue
         if isinstance(user, bpy.types.Material) and not _drives_more(user, rig):
             continue
@@ -391,7 +411,7 @@ def _has_driver_on(owner: bpy.types.ID | None, rig: ArmatureObject) -> bool:
     return any(
         target.id == rig
         for curve in (data.drivers if data else ())
-        for variable in drivers.compat.driver_of(curve).variables
+        for variable in compat.driver_of(curve).variables
         for target in variable.targets
     )
 

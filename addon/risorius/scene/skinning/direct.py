@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import bmesh
 import numpy as np
@@ -19,6 +20,7 @@ from ..base import last_written, parts, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes, runtime
 from . import bone_writer, conditions, skins
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -54,12 +56,11 @@ class Frame:
 _shown: dict[int, Frame] = session.table("direct.shown", ("rewrite", "undo", "load"))
 
 
-def settle(rig: ArmatureObject, live: runtime.Runtime, plan: conditions.Plan) -> bool:
+def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
     """Bring the meshes of a face into the modes of a plan.
 
     Args:
         rig: deforming armature.
-        live: its Runtime.
         plan: of the face.
 
     Returns:
@@ -72,7 +73,7 @@ def settle(rig: ArmatureObject, live: runtime.Runtime, plan: conditions.Plan) ->
             take(item, rig)
             changed = True
         elif not wanted and parts.FINISHED in item:
-            give_back(item, rig, live)
+            give_back(item, rig)
             changed = True
     return changed
 
@@ -99,13 +100,12 @@ def take(item: MeshObject, rig: ArmatureObject) -> None:
     _forget(item)
 
 
-def give_back(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
+def give_back(item: MeshObject, rig: ArmatureObject) -> None:
     """Bring a mesh out of Direct mode: its modifier deforms it again.
 
     Args:
         item: the mesh object.
-        rig: deforming armature.
-        live: its Runtime; the live key is written afterwards.
+        rig: deforming armature; the live key is written afterwards.
     """
     item.pop(parts.FINISHED, None)
     own = conditions.armature_of(item, rig)
@@ -119,7 +119,7 @@ def give_back(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> N
 def _reset_edited(item: MeshObject) -> None:
     """Give the live key of a mesh in edit mode the neutral form: leaving the mode stores it."""
     edit, block = bmesh.from_edit_mesh(item.data), meshes.live_block(item)
-    layers = edit.verts.layers.shape
+    layers: Any = edit.verts.layers.shape
     key = item.data.shape_keys
     if block is None or key is None or block.name not in layers.keys():  # noqa: SIM118  no dict
         return

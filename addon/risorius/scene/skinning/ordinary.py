@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face in the form that files have, while it is in Direct mode: bones posed, modifiers enabled."""
+"""The form of a face in files, bones posed and modifiers enabled, while it is in Direct mode."""
 
 from __future__ import annotations
 
@@ -25,25 +25,41 @@ def take_on(rigs: Iterable[ArmatureObject]) -> None:
     """
     _finished.clear()
     for rig in rigs:
-        frame = direct.shown(rig)
-        found = [item for item in parts.meshes_of(rig) if parts.FINISHED in item]
-        if frame is None or not found:
-            continue
-        bone_writer.write(rig, frame.live, frame.shape.joints, frame.shape.turns, None)
-        for item in found:
-            _ordinary(item, rig, frame)
+        for item in _finished_meshes(rig):
+            block = meshes.live_block(item)
+            if block is not None:
+                _finished[item.session_uid] = meshes.points_of(block)
+        leave(rig)
 
 
-def _ordinary(item: MeshObject, rig: ArmatureObject, frame: direct.Frame) -> None:
-    block, own = meshes.live_block(item), conditions.armature_of(item, rig)
-    if block is None or own is None:
+def leave(rig: ArmatureObject) -> None:
+    """Bring a face out of Direct mode as it is seen; the next evaluation brings it back.
+
+    Args:
+        rig: deforming armature.
+    """
+    frame, found = direct.shown(rig), _finished_meshes(rig)
+    if not found:
         return
-    _finished[item.session_uid] = meshes.points_of(block)
-    morph = frame.live.morph(item[parts.MESH])
-    rest = morph.evaluate(frame.shape.weights, base=meshes.points_of(parts.keys_there(item).reference_key))
-    block.points.foreach_set("co", rest.ravel())
-    own.show_viewport = own.show_render = True
-    del item[parts.FINISHED]
+    if frame is not None:
+        bone_writer.write(rig, frame.live, frame.shape.joints, frame.shape.turns, None)
+    for item in found:
+        direct.give_back(item, rig)
+        block, key = meshes.live_block(item), item.data.shape_keys
+        if block is None or key is None:
+            continue
+        rest = meshes.points_of(key.reference_key)
+        if frame is not None and len(rest) == frame.live.vertex_count(item[parts.MESH]):
+            morph = frame.live.morph(item[parts.MESH])
+            rest = morph.evaluate(frame.shape.weights, base=rest)
+        block.points.foreach_set("co", rest.ravel())
+        conditions.note_written(item)
+        item.data.update_tag()
+    last_written.inputs.pop(rig.session_uid, None)
+
+
+def _finished_meshes(rig: ArmatureObject) -> list[MeshObject]:
+    return [item for item in parts.meshes_pointing_at(rig) if parts.FINISHED in item]
 
 
 def take_off(rigs: Iterable[ArmatureObject]) -> None:
@@ -54,8 +70,8 @@ def take_off(rigs: Iterable[ArmatureObject]) -> None:
             block, own = meshes.live_block(item), conditions.armature_of(item, rig)
             if points is None or block is None or own is None:
                 continue
+            direct.take(item, rig)
             block.points.foreach_set("co", points.ravel())
-            own.show_viewport = own.show_render = False
-            item[parts.FINISHED] = True
             conditions.note_written(item)
+            item.data.update_tag()
     _finished.clear()

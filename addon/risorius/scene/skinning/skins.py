@@ -10,7 +10,7 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import parts, session
+from ..base import session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes
 
