@@ -115,5 +115,3 @@ __all__ = [
     "solve_clip",
     "solve_drag",
 ]
-
-from ._shim import JointChain, Skin

@@ -16,7 +16,7 @@ from ... import native
 from ...logic.base.space import Space
 from ...logic.character import plans, user_edits
 from ...logic.character.plans import LIVE_KEY
-from ..base import compat, drivers, parts, saved
+from ..base import compat, drivers, parts, saved, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from .armatures import lock_place
 
@@ -25,6 +25,20 @@ _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
 _LIVE_MARK = "KEY_BSPLINE"
 
 Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
+
+
+# Mesh objects that were built and not edited since: they have the skin weights of their file.
+_fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
+
+
+def fresh_weights(item: MeshObject) -> bool:
+    """Whether a mesh was built a moment ago, and has the skin weights of its file."""
+    return item.session_uid in _fresh
+
+
+def note_edit(uid: int) -> None:
+    """A mesh was edited. Args: uid  the session uid of its object."""
+    _fresh.discard(uid)
 
 
 def build_mesh(
@@ -74,6 +88,7 @@ def build_mesh(
     item[parts.LODS] = list(mesh_plan.lods)
     item[parts.MODE] = "KEYS"
     item.property_overridable_library_set(f'["{parts.MODE}"]', True)
+    _fresh.add(item.session_uid)
     return item
 
 

@@ -81,6 +81,7 @@ def _is_rendered() -> bool:
 
 @persistent
 def _render_begins(*_arguments: object) -> None:
+    refresh(evaluate.Moment.ANEW)  # modes do not change while it runs
     _work.rendering = True
 
 
@@ -111,10 +112,11 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
         return
     _work.busy = True
     try:
+        known = _objects.now
         _notice_copies(depsgraph.updates)
         # A change of a colour space is among the updates, one of pixels is not.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
-        skins.forget(conditions.note_updates(depsgraph))
+        skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
         _mended.clear()
         edited = _edited(depsgraph)
@@ -260,7 +262,7 @@ def _loaded(*_arguments: object) -> None:
         last_written.forget()
         look_masks.take_away()  # of a file that Blender saved by itself, before a crash
         heat.end_all()
-        refresh()
+        refresh(evaluate.Moment.LOAD)
     _restored()
 
 
@@ -322,14 +324,18 @@ def _end_tests(*_arguments: object) -> None:
         refresh()
 
 
-def refresh() -> None:
-    """Bring all characters up to their controls now, each in the scenes that it is in."""
+def refresh(moment: evaluate.Moment = evaluate.Moment.UPDATE) -> None:
+    """Bring all characters up to their controls now, each in the scenes that it is in.
+
+    Args:
+        moment: Moment.
+    """
     if native.problem() or not parts.rigs():
         return
     for scene in bpy.data.scenes:
         for layer in scene.view_layers:
             if layer.depsgraph is not None:
-                evaluate.evaluate_all(cast("Depsgraph", layer.depsgraph))
+                evaluate.evaluate_all(cast("Depsgraph", layer.depsgraph), moment)
 
 
 _HANDLERS = (

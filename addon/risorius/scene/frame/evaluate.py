@@ -28,6 +28,8 @@ from . import channel_preview, controls_ahead, inputs, joint_readings, lateness,
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
 # Deforming armature -> what was done before this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
+# Deforming armature -> what the controls of a face asked for when its file was opened.
+_opened: dict[int, tuple[object, ...]] = session.table("evaluate.opened", ("load",))
 
 
 class Moment(Enum):
@@ -35,12 +37,14 @@ class Moment(Enum):
 
     UPDATE: after Blender evaluated what is read. ANEW: then, too, and what seems unchanged is
     written as well. FRAME: before Blender evaluates a frame. RENDER: before one that is rendered.
+    LOAD: after a file was opened, whose faces stay as they were saved until they move.
     """
 
     UPDATE = auto()
     ANEW = auto()
     FRAME = auto()
     RENDER = auto()
+    LOAD = auto()
 
 
 _BEFORE_FRAME = frozenset((Moment.FRAME, Moment.RENDER))
@@ -75,16 +79,17 @@ def is_paused() -> bool:
     return _pauses.now > 0
 
 
-def evaluate_all(depsgraph: Depsgraph) -> None:
+def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
     """Bring every character of this file up to its controls.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
+        moment: Moment.
     """
     if native.problem() or is_paused():
         return
     for rig in parts.rigs():
-        evaluate(rig, depsgraph)
+        evaluate(rig, depsgraph, moment)
 
 
 def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
@@ -206,11 +211,10 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     test = channel_preview.override(rig, raw, depsgraph.scene)
     rendering = moment is Moment.RENDER or depsgraph.mode == "RENDER"
     look = look_masks.for_frame(rig, rendering)
-    # A mode is not changed in the middle of a render: Blender's graph of it would be built anew.
-    plan = (rendering and conditions.known(rig)) or conditions.of(rig, live)
+    asked = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
+    plan = _plan(rig, live, asked, moment, rendering)
     changed = not rendering and direct.settle(rig, plan)
-    shown = (test, look, plan)
-    state = (raw.tobytes(), lod, shown, *((name, *turn) for name, turn in turns.items()))
+    state = (*asked, plan)
     anew = moment is Moment.ANEW or changed
     if not last_written.is_new(last_written.inputs, rig, state) and not anew:
         timing.looked(times[0])
@@ -241,6 +245,25 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     times.append(perf_counter())
     timing.add(times)
     return True
+
+
+def _plan(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    asked: tuple[object, ...],
+    moment: Moment,
+    rendering: bool,
+) -> conditions.Plan:
+    """How a face is shown now. Args: see evaluate; asked  what its controls ask for."""
+    if rendering:  # modes do not change in a render: Blender would build its graph anew
+        return conditions.known(rig) or conditions.ORDINARY
+    if moment is Moment.LOAD:
+        _opened[rig.session_uid] = asked
+    # The skin weights of a face are read when it moves, so that a file opens as fast as before.
+    if _opened.get(rig.session_uid) == asked and moment is not Moment.ANEW:
+        return conditions.ORDINARY
+    _opened.pop(rig.session_uid, None)
+    return conditions.of(rig, live)
 
 
 def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment: Moment) -> int:

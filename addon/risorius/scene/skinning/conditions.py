@@ -39,6 +39,9 @@ class Plan:
     why: tuple[Sentence, ...] = ()
 
 
+ORDINARY = Plan()  # as in a file: every mesh is deformed by its armature modifier
+
+
 @dataclass
 class _Kept:
     """Attributes: plan; signature  see _signature; is_fresh  whether nothing was edited since."""
@@ -64,7 +67,7 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
         live: the character's Runtime.
     """
     if rig.session_uid in _ordinary:
-        return Plan()
+        return ORDINARY
     kept = _kept.get(rig.session_uid)
     if kept is None or not kept.is_fresh:
         kept = _kept[rig.session_uid] = _Kept(look(rig, live), _signature(rig))

@@ -172,7 +172,7 @@ def write(item: MeshObject, frame: Frame, force: bool) -> None:
     key, block, number = item.data.shape_keys, meshes.live_block(item), item[parts.MESH]
     if key is None or block is None:
         return
-    skin, morph = skins.of(item, frame.bones), frame.live.morph(number)
+    skin, morph = skins.of(item, frame.bones, frame.live), frame.live.morph(number)
     weights = frame.shape.weights
     state = (weights[morph.channel_indices].tobytes(), frame.matrices[skin.used].tobytes())
     if not last_written.is_new(last_written.weights, key, state) and not force:

@@ -10,9 +10,9 @@ from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import session
+from ..base import parts, saved, session
 from ..base.blender_types import ArmatureObject, MeshObject
-from ..character import meshes
+from ..character import meshes, runtime
 
 _SAMPLES = 16  # vertices whose weights tell that undo left a mesh as it was
 
@@ -23,12 +23,14 @@ class Bones:
 
     Attributes:
         names: bone -> its place among the pose's bones.
+        joints: joint -> the place of its bone.
         chain: risorius.JointChain of them.
         location, rotation, scale: float32[B, 3 or 4 (w x y z)] of all bones; the evaluator writes
             the rows of its joints.
     """
 
     names: dict[str, int]
+    joints: dict[int, int]
     chain: native.JointChain
     location: NDArray[np.float32]
     rotation: NDArray[np.float32]
@@ -68,6 +70,7 @@ def forget(uids: set[int]) -> None:
     """Meshes were edited. Args: uids  of the mesh objects."""
     for uid in uids:
         _skins.pop(uid, None)
+        meshes.note_edit(uid)
 
 
 def forget_bones(rig: ArmatureObject) -> None:
@@ -83,12 +86,13 @@ def bones_of(rig: ArmatureObject) -> Bones:
     return kept
 
 
-def of(item: MeshObject, bones: Bones) -> Skin:
+def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     """The skin of a mesh as it is now.
 
     Args:
         item: the mesh object.
         bones: those of its deforming armature.
+        live: the character's Runtime.
     """
     uid = item.session_uid
     kept = _skins.get(uid)
@@ -96,7 +100,7 @@ def of(item: MeshObject, bones: Bones) -> Skin:
         kept = None
     _unsure.discard(uid)
     if kept is None:
-        kept = _skins[uid] = _read_skin(item, bones)
+        kept = _skins[uid] = _read_skin(item, bones, live)
     return kept
 
 
@@ -124,32 +128,60 @@ def _read_bones(rig: ArmatureObject) -> Bones:
         moved, turned, sized = matrix.decompose()
         location[place], rotation[place], scale[place] = moved, turned, sized
     chain = native.module().JointChain(parents, sorted_rest)
-    return Bones(names, chain, location, rotation, scale)
+    numbers = {bone.name: saved.whole(bone, parts.JOINT, -1) for bone in rests}
+    joints = {number: names[name] for name, number in numbers.items() if number >= 0}
+    return Bones(names, joints, chain, location, rotation, scale)
 
 
-def _read_skin(item: MeshObject, bones: Bones) -> Skin:
-    place_of = [bones.names.get(group.name, -1) for group in item.vertex_groups]
-    vertices = item.data.vertices
-    held = [[(e.group, e.weight) for e in vertex.groups] for vertex in vertices]
-    counts = np.fromiter(map(len, held), np.int64, len(held))
-    pairs = np.array([pair for row in held for pair in row], np.float64).reshape(-1, 2)
-    groups = pairs[:, 0].astype(np.int64)
-    places = np.full(max(len(place_of), int(groups.max(initial=-1)) + 1), -1, np.int64)
-    places[: len(place_of)] = place_of
-    found = places[groups]
-    kept = (found >= 0) & (pairs[:, 1] > 0.0)
-    owner = np.repeat(np.arange(len(held)), counts)[kept]
-    offsets = np.zeros(len(held) + 1, np.uint32)
-    np.cumsum(np.bincount(owner, minlength=len(held)), out=offsets[1:])
-    used = found[kept]
+def _read_skin(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
+    count = len(item.data.vertices)
+    fresh = meshes.fresh_weights(item)
+    counts, places, weights = (
+        _weights_of_file(item, bones, live) if fresh else _weights_of_groups(item, bones)
+    )
+    kept = (places >= 0) & (weights > 0.0)
+    owner = np.repeat(np.arange(count), counts)[kept]
+    offsets = np.zeros(count + 1, np.uint32)
+    np.cumsum(np.bincount(owner, minlength=count), out=offsets[1:])
+    used = places[kept]
     skin = native.module().Skin(
-        len(held),
-        offsets,
-        used.astype(np.uint32),
-        pairs[kept, 1].astype(np.float32),
-        len(bones.names),
+        count, offsets, used.astype(np.uint32), weights[kept], len(bones.names)
     )
     return Skin(skin, meshes.basis_of(item), np.unique(used), _mark(item))
+
+
+_Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
+
+
+def _weights_of_file(item: MeshObject, bones: Bones, live: runtime.Runtime) -> _Weights:
+    """As _weights_of_groups, of a mesh that was built a moment ago."""
+    data = live.dna.meshes[item[parts.MESH]]
+    place_of = np.full(len(live.rest), -1, np.int64)
+    place_of[list(bones.joints)] = list(bones.joints.values())
+    counts = np.diff(np.asarray(data.skin_offsets, np.int64))
+    places = place_of[np.asarray(data.skin_joint_indices, np.int64)]
+    return counts, places, np.asarray(data.skin_weights, np.float32)
+
+
+def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
+    """The weights of a mesh's vertex groups.
+
+    Returns:
+        int64[V] weights of each vertex; int64[N] the place of each weight's bone, -1 for none;
+        float32[N] the weights.
+    """
+    vertices, groups_there = item.data.vertices, item.vertex_groups
+    counts = np.fromiter((len(v.groups) for v in vertices), np.int64, len(vertices))
+    groups, weights = np.empty(counts.sum(), np.int32), np.empty(counts.sum(), np.float32)
+    begin = 0
+    for vertex, count in zip(vertices, counts.tolist(), strict=True):
+        held = vertex.groups  # in bulk: a Python object for each weight takes four times as long
+        held.foreach_get("group", groups[begin : begin + count])
+        held.foreach_get("weight", weights[begin : begin + count])
+        begin += count
+    places = np.full(max(len(groups_there), int(groups.max(initial=-1)) + 1), -1, np.int64)
+    places[: len(groups_there)] = [bones.names.get(group.name, -1) for group in groups_there]
+    return counts, places[groups], weights
 
 
 def _mark(item: MeshObject) -> tuple[object, ...]:
