@@ -14,6 +14,7 @@
 #endif
 #include "simd/kernels_inline.h"
 #include "simd/rotation_parts_avx2.h"
+#include "simd/skin_body.h"
 
 namespace risorius::simd {
 
@@ -32,8 +33,39 @@ constexpr auto kExpandOrders = [] {
   return orders;
 }();
 
+// Two columns of the matrix in each register.
+struct ColumnsByTwo {
+  struct Sum {
+    __m256 c[2];
+  };
+  using Weights = const float*;
+  static constexpr std::size_t kInFlight = 4, kAtOnce = 4;
+  RISORIUS_INLINE static Sum zero() { return {{_mm256_setzero_ps(), _mm256_setzero_ps()}}; }
+  RISORIUS_INLINE static const float* weights(const float* p) { return p; }
+  template <std::size_t kWeight>
+  RISORIUS_INLINE static void add(Sum& sum, const float* weights, const float* row) {
+    const __m256 w = _mm256_broadcast_ss(weights + kWeight);
+    sum.c[0] = _mm256_fmadd_ps(w, _mm256_load_ps(row), sum.c[0]);
+    sum.c[1] = _mm256_fmadd_ps(w, _mm256_load_ps(row + 8), sum.c[1]);
+  }
+  RISORIUS_INLINE static void finish(const Sum& sum, const float* point, float* out) {
+    const __m256 first = _mm256_insertf128_ps(_mm256_broadcast_ss(point),
+                                              _mm_broadcast_ss(point + 1), 1),
+                 second =
+                     _mm256_insertf128_ps(_mm256_broadcast_ss(point + 2), _mm_set1_ps(1.0f), 1);
+    const __m256 both = _mm256_fmadd_ps(sum.c[0], first, _mm256_mul_ps(sum.c[1], second));
+    const __m128 by = _mm_add_ps(_mm256_castps256_ps128(both), _mm256_extractf128_ps(both, 1));
+    const __m128 p = _mm_setr_ps(point[0], point[1], point[2], 0.0f);
+    const __m128 moved = _mm_add_ps(p, by);
+    _mm_storel_pi(reinterpret_cast<__m64*>(out), moved);
+    _mm_store_ss(out + 2, _mm_movehl_ps(moved, moved));
+  }
+  RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_columns(matrix, row); }
+};
+
 struct V {
   using Parts = EightByFour;
+  using Skin = ColumnsByTwo;
   using Reg = __m256;
   static constexpr std::size_t kLanes = 8, kBlocks = 12, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 4;

@@ -11,6 +11,7 @@
 #endif
 #include "simd/kernels_inline.h"
 #include "simd/rotations_body.h"
+#include "simd/skin_body.h"
 
 namespace risorius::simd {
 
@@ -74,8 +75,40 @@ struct SixteenByFour {
   }
 };
 
+// All columns of the matrix in one register.
+struct AllColumns {
+  struct Sum {
+    __m512 c;
+  };
+  using Weights = const float*;
+  static constexpr std::size_t kInFlight = 4, kAtOnce = 4;
+  RISORIUS_INLINE static Sum zero() { return {_mm512_setzero_ps()}; }
+  RISORIUS_INLINE static const float* weights(const float* p) { return p; }
+  template <std::size_t kWeight>
+  RISORIUS_INLINE static void add(Sum& sum, const float* weights, const float* row) {
+    sum.c = _mm512_fmadd_ps(_mm512_set1_ps(weights[kWeight]), _mm512_load_ps(row), sum.c);
+  }
+  // With masks: gcc 12 takes the plain ones for reads of something unset.
+  RISORIUS_INLINE static void finish(const Sum& sum, const float* point, float* out) {
+    constexpr __mmask16 kAll = 0xFFFF;
+    constexpr __mmask8 kThree = 7, kFour = 0xF;
+    const __m128 p = _mm_maskz_loadu_ps(kThree, point);
+    const __m128 with_1 = _mm_insert_ps(p, _mm_set_ss(1.0f), 0x30);
+    const __m512i column = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+    const __m512 by = _mm512_maskz_permutexvar_ps(kAll, column, _mm512_castps128_ps512(with_1));
+    const __m512 products = _mm512_mul_ps(sum.c, by);
+    const __m256 two = _mm256_add_ps(_mm512_maskz_extractf32x8_ps(0xFF, products, 0),
+                                     _mm512_maskz_extractf32x8_ps(0xFF, products, 1));
+    const __m128 one =
+        _mm_add_ps(_mm256_castps256_ps128(two), _mm256_maskz_extractf32x4_ps(kFour, two, 1));
+    _mm_mask_storeu_ps(out, kThree, _mm_add_ps(p, one));
+  }
+  RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_columns(matrix, row); }
+};
+
 struct V {
   using Parts = SixteenByFour;
+  using Skin = AllColumns;
   using Reg = __m512;
   static constexpr std::size_t kLanes = 16, kBlocks = 8, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 8;

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: MIT
+#include "rig/outputs/skin.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+namespace risorius::rig {
+namespace {
+
+using core::ErrorCode;
+using core::fail;
+using core::Result;
+using core::Status;
+
+struct Lists {
+  std::span<const std::uint32_t> offsets, bones;
+  std::span<const float> weights;
+};
+
+std::string found(std::size_t n) { return ", found " + std::to_string(n); }
+
+Status check_offsets(std::uint32_t vertex_count, const Lists& lists) {
+  const auto& offsets = lists.offsets;
+  if (offsets.size() != std::size_t{vertex_count} + 1) {
+    return fail(ErrorCode::kInvalidLength, "offsets",
+                std::to_string(std::size_t{vertex_count} + 1) +
+                    " offsets were expected, one more than vertices" + found(offsets.size()));
+  }
+  if (lists.bones.size() != lists.weights.size()) {
+    return fail(ErrorCode::kInvalidLength, "weights",
+                "a weight for each of " + std::to_string(lists.bones.size()) +
+                    " bones was expected" + found(lists.weights.size()));
+  }
+  if (offsets.front() != 0 || !std::ranges::is_sorted(offsets) ||
+      offsets.back() != lists.bones.size()) {
+    return fail(ErrorCode::kInvalidIndex, "offsets",
+                "offsets that ascend from 0 to the number of influences, " +
+                    std::to_string(lists.bones.size()) + ", were expected");
+  }
+  return core::ok();
+}
+
+Status check_influences(const Lists& lists, std::uint32_t vertex_count, std::uint32_t bone_count) {
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    for (std::size_t i = lists.offsets[v]; i < lists.offsets[v + 1]; ++i) {
+      if (lists.bones[i] >= bone_count) {
+        return fail(ErrorCode::kInvalidIndex, "bones",
+                    "vertex " + std::to_string(v) + " has a weight of bone " +
+                        std::to_string(lists.bones[i]) + ", but there are " +
+                        std::to_string(bone_count));
+      }
+      if (!(lists.weights[i] >= 0) || !std::isfinite(lists.weights[i])) {
+        return fail(ErrorCode::kInvalidValue, "weights",
+                    "vertex " + std::to_string(v) + " has the weight " +
+                        std::to_string(lists.weights[i]) + " of bone " +
+                        std::to_string(lists.bones[i]) + "; 0 or more was expected");
+      }
+    }
+  }
+  return core::ok();
+}
+
+// What divides the weights of a vertex, or 0 where it stays.
+float divisor(std::span<const float> weights) {
+  const float sum = std::accumulate(weights.begin(), weights.end(), 0.0f);
+  return sum > kLeastWeight && std::isfinite(sum) ? sum : 0.0f;
+}
+
+// The influences of a vertex that move it.
+std::uint32_t count_of(std::span<const float> weights) {
+  if (divisor(weights) == 0) return 0;
+  return static_cast<std::uint32_t>(weights.size()) -
+         static_cast<std::uint32_t>(std::ranges::count(weights, 0.0f));
+}
+
+void add_vertex(const Lists& lists, std::size_t v, Skin& skin) {
+  const std::size_t begin = lists.offsets[v], n = lists.offsets[v + 1] - begin;
+  const float sum = divisor(lists.weights.subspan(begin, n));
+  for (std::size_t i = begin; sum != 0 && i < begin + n; ++i) {
+    if (lists.weights[i] == 0) continue;
+    skin.bones.push_back(static_cast<std::uint16_t>(lists.bones[i]));
+    skin.weights.push_back(lists.weights[i] / sum);
+  }
+}
+
+// The vertices [begin, end), by the number of their influences and then in their order.
+void add_block(const Lists& lists, std::uint32_t begin, std::uint32_t end, Skin& skin) {
+  std::vector<std::uint32_t> counts(end - begin);
+  for (std::uint32_t v = begin; v < end; ++v) {
+    const std::size_t at = lists.offsets[v];
+    counts[v - begin] = count_of(lists.weights.subspan(at, lists.offsets[v + 1] - at));
+  }
+  std::vector<std::uint16_t> order(end - begin);
+  std::iota(order.begin(), order.end(), std::uint16_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::uint16_t v) { return counts[v]; });
+  const std::size_t first = skin.runs.size();
+  skin.blocks.push_back({static_cast<std::uint32_t>(first), skin.bones.size()});
+  for (const std::uint16_t v : order) {
+    if (skin.runs.size() == first || skin.runs.back().influences != counts[v]) {
+      skin.runs.push_back({0, counts[v]});
+    }
+    ++skin.runs.back().vertices;
+    skin.vertices.push_back(v);
+    add_vertex(lists, begin + v, skin);
+  }
+}
+
+}  // namespace
+
+std::size_t Skin::memory_bytes() const {
+  return sizeof(Skin) + runs.size() * sizeof(simd::SkinRun) + blocks.size() * sizeof(Block) +
+         (vertices.size() + bones.size() + bones_used.size()) * 2 + weights.size() * 4;
+}
+
+Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t> offsets,
+                       std::span<const std::uint32_t> bones, std::span<const float> weights,
+                       std::uint32_t bone_count) {
+  const Lists lists{offsets, bones, weights};
+  if (bone_count > 0x10000) {
+    return fail(ErrorCode::kLimitExceeded, "bone_count",
+                "at most 65536 bones were expected" + found(bone_count));
+  }
+  RISORIUS_TRY(check_offsets(vertex_count, lists));
+  RISORIUS_TRY(check_influences(lists, vertex_count, bone_count));
+  Skin skin;
+  skin.vertex_count = vertex_count, skin.bone_count = bone_count;
+  skin.vertices.reserve(vertex_count);
+  skin.bones.reserve(bones.size());
+  skin.weights.reserve(bones.size() + simd::kWidest);
+  for (std::uint32_t v = 0; v < vertex_count; v += std::min(kSkinBlock, vertex_count - v)) {
+    add_block(lists, v, v + std::min(kSkinBlock, vertex_count - v), skin);
+  }
+  skin.blocks.push_back({static_cast<std::uint32_t>(skin.runs.size()), skin.bones.size()});
+  skin.weights.resize(skin.weights.size() + simd::kWidest);
+  std::vector<std::uint8_t> used(bone_count);
+  for (const std::uint16_t bone : skin.bones) used[bone] = 1;
+  for (std::uint32_t b = 0; b < bone_count; ++b) {
+    if (used[b] != 0) skin.bones_used.push_back(static_cast<std::uint16_t>(b));
+  }
+  return skin;
+}
+
+void evaluate_skin_block(const Skin& skin, const simd::Kernels& kernels, const float* rows,
+                         std::uint32_t block, const float* points, float* out) noexcept {
+  const Skin::Block &own = skin.blocks[block], &next = skin.blocks[block + 1];
+  kernels.skin(rows,
+               {skin.runs.data() + own.run, next.run - own.run,
+                skin.vertices.data() + std::size_t{block} * kSkinBlock,
+                skin.bones.data() + own.influence, skin.weights.data() + own.influence},
+               points, out);
+}
+
+void evaluate_skin(const Skin& skin, const simd::Kernels& kernels, const float* rows,
+                   const float* points, float* out) noexcept {
+  for (std::uint32_t b = 0; b < skin.block_count(); ++b) {
+    const std::size_t begin = std::size_t{b} * kSkinBlock * 3;
+    evaluate_skin_block(skin, kernels, rows, b, points + begin, out + begin);
+  }
+}
+
+}  // namespace risorius::rig
