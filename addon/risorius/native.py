@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
         BoneSpace,
         Clip,
         ControlLimits,
+        DirectFace,
         Dna,
         JointChain,
         Layer,

@@ -48,7 +48,10 @@ class HeadTurns:
         seen = rig.evaluated_get(depsgraph)
         self._live, self._bones, self._rests = live, seen.pose.bones, rig.data.bones
         plan = conditions.known(rig)
-        self._frame = direct.shown(rig) if plan is not None and not plan.posed else None
+        frame = direct.shown(rig) if plan is not None and not plan.posed else None
+        self._places = frame.bones.names if frame is not None else {}
+        self._posed = frame.matrices() if frame is not None else None
+        self._channels = frame.bone_channels() if frame is not None else {}
         numbers = ((saved.whole(b, parts.JOINT, -1), b.name) for b in rig.data.bones)
         self._names = {joint: name for joint, name in numbers if joint >= 0}
         self._place = np.array(seen.matrix_world)
@@ -128,16 +131,16 @@ class HeadTurns:
         return np.array(self._skin(joint) @ carrier.inverted_safe()) @ above
 
     def _location(self, name: str) -> Vector:
-        if self._frame is None:
+        if self._posed is None:
             return self._bones[name].location
-        return Vector(self._frame.bones.location[self._frame.bones.names[name]].tolist())
+        return Vector(self._channels["location"][self._places[name]].tolist())
 
     def _skin(self, joint: int) -> Matrix:
         name = self._names.get(joint)
         if name is None:
             return Matrix()
-        if self._frame is not None:  # no bone is posed
-            return Matrix([*self._frame.matrices[self._frame.bones.names[name]].tolist(), _LAST])
+        if self._posed is not None:  # natively, in Direct mode
+            return Matrix([*self._posed[self._places[name]].tolist(), _LAST])
         return self._bones[name].matrix @ self._rests[name].matrix_local.inverted_safe()
 
 

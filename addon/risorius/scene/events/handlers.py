@@ -127,10 +127,11 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
         ]
         if edited:
             timing.begin()
-        for rig in edited:
-            if _mend(rig):
-                continue  # the evaluated copy knows of it only after the next update
-            evaluate.evaluate(rig, depsgraph)
+        with evaluate.together():
+            for rig in edited:
+                if _mend(rig):
+                    continue  # the evaluated copy knows of it only after the next update
+                evaluate.evaluate(rig, depsgraph)
     finally:
         _work.busy = False
 

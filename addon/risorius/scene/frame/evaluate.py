@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
 from time import perf_counter
+from typing import cast
 
 import bpy
 import numpy as np
@@ -28,6 +29,10 @@ from . import channel_preview, controls_ahead, inputs, joint_readings, lateness,
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
 # Deforming armature -> what was done before this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
+# Finished positions of several faces that are written together; None: at once.
+_gathered = session.value(
+    "evaluate.gathered", cast("list[direct.Job] | None", None), ("unregister",)
+)
 # Deforming armature -> what the controls of a face asked for when its file was opened.
 _opened: dict[int, tuple[object, ...]] = session.table("evaluate.opened", ("load",))
 
@@ -88,8 +93,9 @@ def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
     """
     if native.problem() or is_paused():
         return
-    for rig in parts.rigs():
-        evaluate(rig, depsgraph, moment)
+    with together():
+        for rig in parts.rigs():
+            evaluate(rig, depsgraph, moment)
 
 
 def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
@@ -114,11 +120,12 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     timing.animated()
     if depsgraph is None:
         return
-    for rig, controls in faces:
-        seen = controls.evaluated_get(depsgraph)
-        glance = _glance(seen) if _is_simple(rig, seen) else None
-        wrote = evaluate(rig, depsgraph, Moment.RENDER if rendering else Moment.FRAME)
-        _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
+    with together():
+        for rig, controls in faces:
+            seen = controls.evaluated_get(depsgraph)
+            glance = _glance(seen) if _is_simple(rig, seen) else None
+            wrote = evaluate(rig, depsgraph, Moment.RENDER if rendering else Moment.FRAME)
+            _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
 
 
 def _look_at_joints(edited: bool) -> bool:
@@ -139,18 +146,19 @@ def after_frame(depsgraph: Depsgraph) -> None:
     """
     if native.problem() or is_paused():
         return
-    for rig in parts.rigs():
-        done = _ahead.pop(rig.session_uid, None)
-        again = done is not None and done.wrote and drivers.moves(rig)
-        if done is not None and not again and _is_as_before(rig, done, depsgraph):
-            continue
-        was = last_written.inputs.get(rig.session_uid)
-        if again:
-            # Other animation of its bones came over ours.
-            last_written.inputs.pop(rig.session_uid, None)
-        if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
-            now = last_written.inputs.get(rig.session_uid)
-            lateness.count(rig, was, now, runtime.there(rig).labels)
+    with together():
+        for rig in parts.rigs():
+            done = _ahead.pop(rig.session_uid, None)
+            again = done is not None and done.wrote and drivers.moves(rig)
+            if done is not None and not again and _is_as_before(rig, done, depsgraph):
+                continue
+            was = last_written.inputs.get(rig.session_uid)
+            if again:
+                # Other animation of its bones came over ours.
+                last_written.inputs.pop(rig.session_uid, None)
+            if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
+                now = last_written.inputs.get(rig.session_uid)
+                lateness.count(rig, was, now, runtime.there(rig).labels)
     live_keys.reach(depsgraph)
 
 
@@ -233,18 +241,46 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         rig.update_tag(refresh={"OBJECT"})
     values.write(rig, pose.animated_maps, pose.blend_shapes)
     times.append(perf_counter())
-    shape = direct.Shape(pose.joints, pose.blend_shapes, turns)
-    frame = direct.begin(rig, live, shape) if plan.direct else None
+    finished = []
     for item in parts.meshes_of(rig):
         if not lods.shows(item, lod):
             continue
-        if frame is not None and item.session_uid in plan.direct:
-            direct.write(item, frame, anew)
+        if item.session_uid in plan.direct:
+            finished.append(item)
         else:
             live_keys.write(item, live, pose.blend_shapes, anew, moment in _BEFORE_FRAME)
+    if finished:
+        shape = direct.Shape(pose.joints, pose.blend_shapes, turns)
+        _write_finished(direct.prepare(rig, live, shape, finished, anew))
     times.append(perf_counter())
     timing.add(times)
     return True
+
+
+def _write_finished(job: direct.Job) -> None:
+    """Write finished positions now, or with those of the other faces: all cores do it together."""
+    if _gathered.now is None:
+        direct.write([job])
+    else:
+        _gathered.now.append(job)
+
+
+@contextmanager
+def together() -> Iterator[None]:
+    """While this lasts finished positions are gathered; at its end all are written at once."""
+    if _gathered.now is not None:
+        yield
+        return
+    _gathered.now = []
+    try:
+        yield
+        jobs = _gathered.now
+    finally:
+        _gathered.now = None
+    if jobs:
+        begin = perf_counter()
+        direct.write(jobs)
+        timing.skinned(begin)
 
 
 def _plan(

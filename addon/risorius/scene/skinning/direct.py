@@ -7,7 +7,7 @@ saves by itself keep: its live key has final positions, and its armature modifie
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from mathutils import Quaternion
 from numpy.typing import NDArray
 
+from ... import native
 from ..base import last_written, parts, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes, runtime
@@ -39,21 +40,58 @@ class Shape:
 
 @dataclass(frozen=True)
 class Frame:
-    """A shape of a face, ready to be written to its meshes.
+    """What the meshes of a face are written with.
 
     Attributes:
-        live: the Runtime; shape; bones: of the deforming armature.
-        matrices: float32[B, 3, 4], the skinning matrices in the armature's space.
+        live: the Runtime.
+        shape: Shape.
+        bones: of the deforming armature.
+        writer: of the bones that the evaluator owns.
     """
 
     live: runtime.Runtime
     shape: Shape
     bones: skins.Bones
-    matrices: NDArray[np.float32]
+    writer: bone_writer.Writer
+
+    def bone_channels(self) -> dict[str, NDArray[np.float32]]:
+        """ "location", "rotation_quaternion", "scale" -> float32[B, width] of all bones."""
+        bones, writer = self.bones, self.writer
+        owned = bone_writer.pose_of(writer, self.shape.joints, self.shape.turns)
+        rest = (bones.location, bones.rotation, bones.scale)
+        channels = dict(zip(owned, (values.copy() for values in rest), strict=True))
+        for name, values in channels.items():
+            values[writer.where] = owned[name]
+        return channels
+
+    def matrices(self) -> NDArray[np.float32]:
+        """float32[B, 3, 4], the skinning matrices of the bones in the armature's space."""
+        return self.bones.chain.evaluate(*self.bone_channels().values())
 
 
-# Deforming armature -> the Frame that was last written.
+@dataclass(frozen=True)
+class _Face:
+    """Attributes: face  compiled; skins  mesh object -> its Skin; bones, writer  see Frame."""
+
+    face: native.DirectFace
+    skins: dict[int, skins.Skin]
+    bones: skins.Bones
+    writer: bone_writer.Writer
+
+
+@dataclass(frozen=True)
+class Job:
+    """A face whose meshes are to be written. Attributes: face; frame; items  by their number."""
+
+    face: native.DirectFace
+    frame: Frame
+    items: dict[int, MeshObject]
+    anew: bool
+
+
+# Deforming armature -> the Frame that was last written; what is compiled of the face.
 _shown: dict[int, Frame] = session.table("direct.shown", ("rewrite", "undo", "load"))
+_faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
 
 
 def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
@@ -134,24 +172,6 @@ def _forget(item: MeshObject) -> None:
         last_written.weights.pop(key.session_uid, None)
 
 
-def begin(rig: ArmatureObject, live: runtime.Runtime, shape: Shape) -> Frame:
-    """Pose the bones of a face natively.
-
-    Args:
-        rig: deforming armature; nothing is written to it.
-        live: its Runtime.
-        shape: what the face is shown with.
-    """
-    bones, writer = skins.bones_of(rig), bone_writer.writer_of(rig, live)
-    owned = bone_writer.pose_of(writer, shape.joints, shape.turns)
-    bones.location[writer.where] = owned["location"]
-    bones.rotation[writer.where] = owned["rotation_quaternion"]
-    bones.scale[writer.where] = owned["scale"]
-    matrices = bones.chain.evaluate(bones.location, bones.rotation, bones.scale)
-    frame = _shown[rig.session_uid] = Frame(live, shape, bones, matrices)
-    return frame
-
-
 def shown(rig: ArmatureObject) -> Frame | None:
     """What a face was last shown with; None where none of its meshes is in Direct mode.
 
@@ -161,23 +181,91 @@ def shown(rig: ArmatureObject) -> Frame | None:
     return _shown.get(rig.session_uid)
 
 
-def write(item: MeshObject, frame: Frame, force: bool) -> None:
-    """Write the finished positions of a mesh to its live key.
+def prepare(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    shape: Shape,
+    items: Sequence[MeshObject],
+    anew: bool,
+) -> Job:
+    """Compile what of a face is not compiled yet.
 
     Args:
-        item: the mesh object, in Direct mode.
-        frame: see `begin`.
-        force: write also what seems unchanged.
+        rig: deforming armature; nothing is written to it.
+        live: its Runtime.
+        shape: what the face is shown with.
+        items: the mesh objects in Direct mode that are written.
+        anew: write also what seems unchanged.
     """
-    key, block, number = item.data.shape_keys, meshes.live_block(item), item[parts.MESH]
-    if key is None or block is None:
-        return
-    skin, morph = skins.of(item, frame.bones, frame.live), frame.live.morph(number)
-    weights = frame.shape.weights
-    state = (weights[morph.channel_indices].tobytes(), frame.matrices[skin.used].tobytes())
-    if not last_written.is_new(last_written.weights, key, state) and not force:
-        return
-    points = skin.skin.evaluate(morph.evaluate(weights, base=skin.base), frame.matrices)
-    block.points.foreach_set("co", points.ravel())
-    conditions.note_written(item)
-    item.data.update_tag()
+    bones, writer = skins.bones_of(rig), bone_writer.writer_of(rig, live)
+    frame = _shown[rig.session_uid] = Frame(live, shape, bones, writer)
+    wanted = {item.session_uid: skins.of(item, bones, live) for item in items}
+    kept = _faces.get(rig.session_uid)
+    if kept is None or kept.bones is not bones or kept.writer is not writer:
+        kept = None
+    if kept is None or any(kept.skins.get(uid) is not skin for uid, skin in wanted.items()):
+        others = {} if kept is None else kept.skins  # of other levels of detail
+        kept = _faces[rig.session_uid] = _compile(frame, {**others, **wanted})
+    order = {uid: number for number, uid in enumerate(kept.skins)}
+    found = {order[item.session_uid]: item for item in items}
+    return Job(kept.face, frame, found, anew)
+
+
+def _compile(frame: Frame, found: dict[int, skins.Skin]) -> _Face:
+    bones, writer = frame.bones, frame.writer
+    face = native.module().DirectFace(
+        frame.live.rig,
+        writer.space,
+        bones.chain,
+        writer.where,
+        [(frame.live.morph(skin.mesh), skin.base, skin.skin) for skin in found.values()],
+        turned=[row for _name, row, _share, _rest in writer.turning],
+    )
+    face.keep(bones.location, bones.rotation, bones.scale)
+    return _Face(face, found, bones, writer)
+
+
+def write(jobs: Sequence[Job]) -> None:
+    """Write finished positions to the live keys of faces, all faces at once.
+
+    Args:
+        jobs: see `prepare`.
+    """
+    targets = [_addresses(job.items) for job in jobs]
+    done = native.module().deform_faces(
+        [job.face for job in jobs],
+        [job.frame.shape.joints for job in jobs],
+        [job.frame.shape.weights for job in jobs],
+        targets,
+        turns=[_turns(job.frame) for job in jobs],
+        anew=any(job.anew for job in jobs),
+    )
+    for job, written in zip(jobs, done, strict=True):
+        for number in written:
+            item = job.items[number]
+            conditions.note_written(item)
+            item.data.update_tag()
+
+
+def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
+    """Mesh -> address and number of the points of its live key."""
+    found = {}
+    for number, item in items.items():
+        block = meshes.live_block(item)
+        if block is not None:
+            points = block.points
+            found[number] = (points[0].as_pointer(), len(points))
+    return found
+
+
+def _turns(frame: Frame) -> NDArray[np.float32] | None:
+    """What turns the joints of neck and head, in the axes of their bones: float32[t, 4]."""
+    turns, turning = frame.shape.turns, frame.writer.turning
+    if not turns or not turning:
+        return None
+    found = np.tile(np.array([1, 0, 0, 0], np.float32), (len(turning), 1))
+    for place, (name, _row, share, rest) in enumerate(turning):
+        if name in turns:
+            part = Quaternion().slerp(turns[name], share) if share < 1.0 else turns[name]
+            found[place] = rest.inverted() @ part @ rest
+    return found

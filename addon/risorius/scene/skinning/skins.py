@@ -42,15 +42,15 @@ class Skin:
     """The skin of a mesh.
 
     Attributes:
+        mesh: its number in the DNA.
         skin: risorius.Skin of its vertex groups.
         base: float32[V, 3], its reference key.
-        used: int64, the bones that move it.
         mark: see _mark.
     """
 
+    mesh: int
     skin: native.Skin
     base: NDArray[np.float32]
-    used: NDArray[np.int64]
     mark: tuple[object, ...]
 
 
@@ -143,11 +143,10 @@ def _read_skin(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     owner = np.repeat(np.arange(count), counts)[kept]
     offsets = np.zeros(count + 1, np.uint32)
     np.cumsum(np.bincount(owner, minlength=count), out=offsets[1:])
-    used = places[kept]
     skin = native.module().Skin(
-        count, offsets, used.astype(np.uint32), weights[kept], len(bones.names)
+        count, offsets, places[kept].astype(np.uint32), weights[kept], len(bones.names)
     )
-    return Skin(skin, meshes.basis_of(item), np.unique(used), _mark(item))
+    return Skin(item[parts.MESH], skin, meshes.basis_of(item), _mark(item))
 
 
 _Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
