@@ -41,6 +41,7 @@ def carry(rig: ArmatureObject, item: MeshObject) -> None:
         rig: deforming armature.
         item: the mesh; Blender has to evaluate it before drivers are pointed at it.
     """
+    item.pop(parts.MAPS, None)  # an overridable array keeps its length
     item[parts.MAPS] = rig[parts.MAPS].to_list()
     item.property_overridable_library_set(f'["{parts.MAPS}"]', True)
     parts.point(rig, parts.VALUES, item)
