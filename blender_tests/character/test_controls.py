@@ -122,6 +122,9 @@ def test_eye_target_moves_the_look_controls(dna_file):
     target = scene.controls(rig).pose.bones["eyes"]
     target.location = (0.1, 0.0, 0.0)
     scene.update(scene.controls(rig))
+    seen = scene.snapshot(rig)
+    scene.pose_bones(rig)
+    np.testing.assert_allclose(scene.snapshot(rig), seen, atol=1e-5)
     eye = next(b for b in rig.pose.bones if b.bone["dna_joint"] == EYE)
     assert abs(eye.rotation_quaternion.w) < 0.9999
 

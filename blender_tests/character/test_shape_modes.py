@@ -285,7 +285,7 @@ def test_the_panel_draws_with_and_without_a_test(dna_file):
 
 
 def test_only_shapes_that_move_something_are_offered(dna_file):
-    rig = scene.load(dna_file)
+    rig = scene.load(dna_file, "KEYS")
     items = scene.submodule("ui.face.channel_preview")._channels(None, bpy.context)
     assert [i[1] for i in items] == [b.name for b in _keys(rig)[1:]]
     with pytest.raises(TypeError):

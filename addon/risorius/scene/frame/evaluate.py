@@ -134,7 +134,10 @@ def _look_at_joints(edited: bool) -> bool:
     for rig in parts.rigs():
         live = runtime.of(rig) if parts.BAKED not in rig else None
         if live is not None:
-            found |= bool(joint_readings.look(rig, live, edited).places)
+            reading = joint_readings.look(rig, live, edited)
+            found |= bool(reading.places)
+            if drivers.moves(rig) or any(reading.wiring):
+                conditions.note_moved(rig)
     return found
 
 

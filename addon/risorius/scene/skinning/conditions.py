@@ -80,6 +80,17 @@ def known(rig: ArmatureObject) -> Plan | None:
     return kept.plan if kept is not None and rig.session_uid not in _ordinary else None
 
 
+def note_moved(rig: ArmatureObject) -> None:
+    """Joints are moved by something else than us: no edit tells of keys that a script gives them.
+
+    Args:
+        rig: deforming armature.
+    """
+    kept = _kept.get(rig.session_uid)
+    if kept is not None and kept.plan.direct:
+        kept.is_fresh = False
+
+
 def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
     """Keep a face as files have it: bones posed, modifiers enabled; calls may be nested.
 
