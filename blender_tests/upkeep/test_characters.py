@@ -98,7 +98,9 @@ def test_duplicate_is_independent(mode, dna_file, linked):
     ours, theirs = scene.meshes(rig)[0], scene.meshes(copy)[0]
     assert ours.data.shape_keys != theirs.data.shape_keys
     assert ours.material_slots[0].material != theirs.material_slots[0].material
-    for item, owner in ((ours, rig), (theirs, copy)):
+    for item, face in ((ours, rig), (theirs, copy)):
+        owner = next(m for m in scene.meshes(face).values() if "maps" in m)
+        assert list(owner["maps"]) == list(face["maps"])
         curves = item.material_slots[0].material.node_tree.animation_data.drivers
         assert {c.driver.variables[0].targets[0].id for c in curves} == {owner}
     _moves_and_is_right(rig, dna_file)
