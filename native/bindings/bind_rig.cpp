@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <list>
 
+#include "bindings/direct/pose_arrays.h"
 #include "bindings/numpy_arrays.h"
-#include "bindings/pose_arrays.h"
 #include "compile/compile.h"
 #include "core/parallel_for.h"
 #include "dna/validate.h"

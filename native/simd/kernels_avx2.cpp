@@ -38,13 +38,15 @@ struct ColumnsByTwo {
   struct Sum {
     __m256 c[2];
   };
-  using Weights = const float*;
-  static constexpr std::size_t kInFlight = 4, kAtOnce = 4;
+  using Weights = __m256;
+  static constexpr std::size_t kTogether = 4;
   RISORIUS_INLINE static Sum zero() { return {{_mm256_setzero_ps(), _mm256_setzero_ps()}}; }
-  RISORIUS_INLINE static const float* weights(const float* p) { return p; }
+  RISORIUS_INLINE static __m256 weights(const float* p) {
+    return _mm256_broadcast_ps(reinterpret_cast<const __m128*>(p));
+  }
   template <std::size_t kWeight>
-  RISORIUS_INLINE static void add(Sum& sum, const float* weights, const float* row) {
-    const __m256 w = _mm256_broadcast_ss(weights + kWeight);
+  RISORIUS_INLINE static void add(Sum& sum, __m256 weights, const float* row) {
+    const __m256 w = _mm256_permute_ps(weights, kWeight * 0x55);
     sum.c[0] = _mm256_fmadd_ps(w, _mm256_load_ps(row), sum.c[0]);
     sum.c[1] = _mm256_fmadd_ps(w, _mm256_load_ps(row + 8), sum.c[1]);
   }

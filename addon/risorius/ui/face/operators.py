@@ -142,9 +142,7 @@ class RISORIUS_OT_prepare_for_export(FaceOperator, Operator):
             rig.pop(parts.SKINNING, None)
         evaluate.bring_up(context, rig)
         if self.enable:
-            self.report(
-                {"INFO"}, say("Joints are posed and shapes are live until Direct is chosen again.")
-            )
+            self.report({"INFO"}, say("Joints are posed until Direct is chosen again."))
         return {"FINISHED"}
 
 

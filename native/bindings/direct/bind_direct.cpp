@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <mutex>
 
+#include "bindings/direct/pose_arrays.h"
 #include "bindings/numpy_arrays.h"
-#include "bindings/pose_arrays.h"
 #include "rig/direct/direct_face.h"
 
 namespace risorius::bindings {
@@ -58,8 +58,8 @@ const rig::FaceParts::Mesh& mesh_of(const PyDirectFace& face, std::size_t mesh) 
                         std::to_string(meshes.size()));
 }
 
-void keep(PyDirectFace& face, const py::object& location, const py::object& rotation,
-          const py::object& scale) {
+void keep_channels(PyDirectFace& face, const py::object& location, const py::object& rotation,
+                   const py::object& scale) {
   const py::ssize_t bones = face.face->parts().chain->size();
   const FloatArray l = shaped_argument(location, "location", {bones, 3}),
                    q = shaped_argument(rotation, "rotation", {bones, 4}),
@@ -77,7 +77,7 @@ void set_base(PyDirectFace& face, std::uint32_t mesh, const py::object& base) {
   face.face->set_base(mesh, points.data());
 }
 
-void forget(PyDirectFace& face) {
+void forget_meshes(PyDirectFace& face) {
   const py::gil_scoped_release released;
   const std::lock_guard held(face.lock);
   face.face->forget();
@@ -262,12 +262,13 @@ void bind_direct(py::module_& m) {
            "float32[V, 3], Skin) each; turned int[t]: which bones of space get a frame's turns.")
       .def_property_readonly("mesh_count",
                              [](const PyDirectFace& f) { return f.face->parts().meshes.size(); })
-      .def("keep", &keep, py::arg("location"), py::arg("rotation"), py::arg("scale"),
+      .def("keep", &keep_channels, py::arg("location"), py::arg("rotation"), py::arg("scale"),
            "What the chain's bones keep that are not in rows: [B, 3], [B, 4] w x y z, [B, 3]. "
            "Nothing, before the first call.")
       .def("set_base", &set_base, py::arg("mesh"), py::arg("base"),
            "Other vertices, float32[V, 3], where no channel and no bone moves a mesh.")
-      .def("forget", &forget, "The next frame writes every mesh: its memory may have changed.");
+      .def("forget", &forget_meshes,
+           "The next frame writes every mesh: its memory may have changed.");
   m.def("evaluate_faces", &evaluate_faces, py::arg("faces"), py::arg("raw"), py::arg("lods"),
         py::arg("targets"), py::kw_only(), py::arg("turns") = py::none(), py::arg("anew") = false,
         py::arg("threads") = 0,
