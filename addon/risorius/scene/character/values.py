@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +14,44 @@ from ..base.blender_types import ArmatureObject, MeshObject
 from ..material import materials
 
 
-def write(rig: ArmatureObject, maps: NDArray[np.float32], channels: NDArray[np.float32]) -> None:
+def write(
+    rig: ArmatureObject,
+    maps: NDArray[np.float32],
+    channels: NDArray[np.float32],
+    simulated: Callable[[bpy.types.Object], bool],
+) -> None:
     """Write the arrays of a face.
 
     Args:
         rig: deforming armature; nothing tells Blender of it.
         maps: float32[M], of the animated maps.
         channels: float32[C].
+        simulated: whether an edit of a mesh resets a simulation.
     """
     _fill(rig, parts.CHANNELS, channels)
     _fill(rig, parts.MAPS, maps)
     carrier = parts.carrier_of(rig)
-    if carrier != rig and _fill(carrier, parts.MAPS, maps):
+    if carrier == rig or not _fill(carrier, parts.MAPS, maps):
+        return
+    if simulated(carrier):
+        _fill_unheard(rig, carrier, maps)
+    else:
         carrier.update_tag(refresh={"OBJECT"})
+
+
+def _fill_unheard(
+    rig: ArmatureObject, carrier: bpy.types.Object, maps: NDArray[np.float32]
+) -> None:
+    """Write maps to the copies of their carrier in all graphs, and let materials read them anew."""
+    layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
+    for graph in (layer.depsgraph for layer in layers):
+        seen = carrier.evaluated_get(graph) if graph is not None else carrier
+        if seen.is_evaluated:
+            _fill(seen, parts.MAPS, maps)
+    for item in parts.meshes_of(rig):
+        for slot in item.material_slots:
+            if slot.material is not None and next(materials.map_drivers(slot.material), None):
+                slot.material.node_tree.update_tag()
 
 
 def _fill(owner: bpy.types.Object, name: str, values: NDArray[np.float32]) -> bool:

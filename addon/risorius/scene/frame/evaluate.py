@@ -242,7 +242,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         if not taken:
             return False  # channels and maps shall not move without the bones
         rig.update_tag(refresh={"OBJECT"})
-    values.write(rig, pose.animated_maps, pose.blend_shapes)
+    values.write(rig, pose.animated_maps, pose.blend_shapes, live_keys.bears_simulation)
     times.append(perf_counter())
     finished = []
     for item in parts.meshes_of(rig):

@@ -159,7 +159,10 @@ def _weights_of_file(item: MeshObject, bones: Bones, live: runtime.Runtime) -> _
     place_of[list(bones.joints)] = list(bones.joints.values())
     counts = np.diff(np.asarray(data.skin_offsets, np.int64))
     places = place_of[np.asarray(data.skin_joint_indices, np.int64)]
-    return counts, places, np.asarray(data.skin_weights, np.float32)
+    weights = np.asarray(data.skin_weights, np.float32)
+    if len(counts) != len(item.data.vertices):  # built without weights: the file has no skin
+        return np.zeros(len(item.data.vertices), np.int64), places[:0], weights[:0]
+    return counts, places, weights
 
 
 def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
