@@ -77,7 +77,7 @@ def carry(rig: ArmatureObject, item: MeshObject) -> None:
 def carry_on_largest(rig: ArmatureObject) -> None:
     """Let the largest mesh of a character carry its maps. Args: rig  deforming armature."""
     items = [item for item in parts.meshes_of(rig) if item.library is None]
-    if items:
+    if items and saved.length(rig, parts.MAPS):
         carry(rig, max(items, key=lambda item: len(item.data.vertices)))
 
 

@@ -252,7 +252,7 @@ def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
     found = {}
     for number, item in items.items():
         block = meshes.live_block(item)
-        if block is not None:
+        if block is not None and len(block.points):
             points = block.points
             found[number] = (points[0].as_pointer(), len(points))
     return found
