@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames of a scene with faces, written by a loop that knows nothing of faces: Blender's own time."""
+"""Frames of faces, written by a loop that knows nothing of faces: they take Blender's own time."""
 
 from __future__ import annotations
 

@@ -159,6 +159,8 @@ def _may_read_anew(item: bpy.types.Object) -> bool:
 
     A lamp that is dragged is edited at each step, and reads no face.
     """
+    if any(modifier.type == "NODES" for modifier in item.modifiers):
+        return True  # inputs of geometry nodes are objects, too
     pointed = _pointed(item)
     if _pointing.get(item.session_uid) == pointed:
         return False
@@ -173,10 +175,7 @@ def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
     targets = [
         (_uid(getattr(hold, "target", None)), getattr(hold, "subtarget", "")) for hold in holds
     ]
-    modifiers = [
-        (_uid(getattr(modifier, "object", None)), *map(_uid, modifier.values()))
-        for modifier in item.modifiers
-    ]
+    modifiers = [_uid(getattr(modifier, "object", None)) for modifier in item.modifiers]
     data = item.animation_data
     count = len(data.drivers) if data is not None else 0
     parent = (_uid(item.parent), item.parent_type, item.parent_bone)
