@@ -66,19 +66,23 @@ struct EulerTurns {
   float parity = 1;
 };
 
-/// Vertices one after the other that have as many influences each.
+/// Vertices one after the other, by groups of kSkinGroup of which the last may have fewer; each has
+/// so many times four influences.
 struct SkinRun {
-  std::uint32_t vertices = 0, influences = 0;
+  std::uint32_t vertices = 0, fours = 0;
 };
+inline constexpr std::size_t kSkinGroup = 4;
 /// Floats that a bone's matrix takes, as `skin_rows` writes it; it begins on a cache line.
 inline constexpr std::size_t kSkinRow = 16;
-/// Some vertices of a skin, run after run.
+/// Some vertices of a skin, run after run. Of each group of a run, four influences of its first
+/// vertex, of its second .. fourth, then the next four of each; where a vertex has fewer, or a
+/// group has none, there stand weights of 0 and a bone whose row is 0.
 struct SkinPart {
   const SkinRun* runs = nullptr;
   std::size_t run_count = 0;
-  const std::uint16_t* vertices = nullptr;  // which of the points each vertex is
-  const std::uint16_t* bones = nullptr;     // by vertex, then by influence
-  const float* weights = nullptr;           // the same; kWidest of them may be read from any one on
+  const std::uint16_t* vertices = nullptr;  // which of the points each is, ascending in a run
+  const std::uint16_t* bones = nullptr;
+  const float* weights = nullptr;
 };
 
 /// Fewer columns a group than these are best added in the order of memory (add_columns); where

@@ -21,7 +21,7 @@ struct RowsOfFour {
     float32x4_t r[3];
   };
   using Weights = float32x4_t;
-  static constexpr std::size_t kInFlight = 4, kAtOnce = 4;
+  static constexpr std::size_t kTogether = 4;
   RISORIUS_INLINE static Sum zero() {
     return {{vdupq_n_f32(0.0f), vdupq_n_f32(0.0f), vdupq_n_f32(0.0f)}};
   }

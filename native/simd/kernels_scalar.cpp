@@ -80,13 +80,13 @@ struct Skin {
   struct Sum {
     float m[12];
   };
-  using Weights = float;
-  static constexpr std::size_t kInFlight = 1, kAtOnce = 1;
+  using Weights = const float*;
+  static constexpr std::size_t kTogether = 1;
   static Sum zero() { return {}; }
-  static float weights(const float* weight) { return *weight; }
-  template <std::size_t>
-  static void add(Sum& sum, float weight, const float* row) {
-    for (std::size_t i = 0; i < 12; ++i) sum.m[i] += weight * row[i];
+  static const float* weights(const float* four) { return four; }
+  template <std::size_t kWeight>
+  static void add(Sum& sum, const float* weights, const float* row) {
+    for (std::size_t i = 0; i < 12; ++i) sum.m[i] += weights[kWeight] * row[i];
   }
   static void finish(const Sum& sum, const float* point, float* out) {
     const float x = point[0], y = point[1], z = point[2], from[3] = {x, y, z};

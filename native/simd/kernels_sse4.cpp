@@ -58,7 +58,7 @@ struct RowsOfFour {
     __m128 r[3];
   };
   using Weights = __m128;
-  static constexpr std::size_t kInFlight = 2, kAtOnce = 4;
+  static constexpr std::size_t kTogether = 2;
   RISORIUS_INLINE static Sum zero() {
     return {{_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()}};
   }

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The skinning kernel over a type S, for the file of each instruction set. S has
-//   Sum: what the matrices of a vertex are blended in; zero(); kInFlight: vertices at once, so that
-//   one need not wait for the sums of another; kAtOnce: influences of one Weights; weights(const
-//   float*); add<i>(sum, weights, row): weight i of these times a row; finish(sum, point, out);
-//   pack(matrix, row): skin_rows of one matrix.
+//   Sum: what the matrices of a vertex are blended in; zero(); kTogether: vertices at once, 1, 2 or
+//   4, so that none has to wait for its own sums; Weights, weights(const float*): four of them;
+//   add<i>(sum, weights, row): weight i times a row; finish(sum, point, out), and where it has a
+//   shorter way for neighbours finish_four(sums, points, out); pack(matrix, row): of skin_rows.
 // After RISORIUS_TARGET.
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <utility>
 
 #include "simd/kernels.h"
@@ -18,39 +20,67 @@ namespace risorius::simd {
 
 namespace {
 
-template <class S, std::size_t kFirst>
-RISORIUS_INLINE void add_influence(typename S::Sum& sum, const float* rows,
-                                   const std::uint16_t* bones, const typename S::Weights& weights) {
-  S::template add<kFirst>(sum, weights, rows + std::size_t{bones[kFirst]} * kSkinRow);
-}
-
+// Four influences of a vertex, one after the other.
 template <class S, std::size_t... kInfluence>
-RISORIUS_INLINE void add_all(typename S::Sum& sum, const float* rows, const std::uint16_t* bones,
-                             const float* weights, std::index_sequence<kInfluence...>) {
+RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std::uint16_t* bones,
+                              const float* weights, std::index_sequence<kInfluence...>) {
   const typename S::Weights all = S::weights(weights);
-  (add_influence<S, kInfluence>(sum, rows, bones, all), ...);
+  if constexpr (S::kTogether == kSkinGroup && std::endian::native == std::endian::little) {
+    // One read for four bones: reads are what most of the time goes into.
+    std::uint64_t four;
+    std::memcpy(&four, bones, sizeof four);
+    (S::template add<kInfluence>(
+         sum, all,
+         rows + std::size_t{static_cast<std::uint16_t>(four >> (16 * kInfluence))} * kSkinRow),
+     ...);
+  } else {
+    (S::template add<kInfluence>(sum, all, rows + std::size_t{bones[kInfluence]} * kSkinRow), ...);
+  }
 }
 
-// kVertices that have as many influences each.
+// Some vertices of a group.
 template <class S, std::size_t... kVertex>
-RISORIUS_INLINE void skin_some(const float* rows, const std::uint16_t* bones, const float* weights,
-                               std::size_t n, const std::uint16_t* vertices, const float* points,
-                               float* out, std::index_sequence<kVertex...>) {
-  typename S::Sum sums[] = {(static_cast<void>(kVertex), S::zero())...};
-  std::size_t i = 0;
-  for (; i + S::kAtOnce <= n; i += S::kAtOnce) {
-    (add_all<S>(sums[kVertex], rows, bones + kVertex * n + i, weights + kVertex * n + i,
-                std::make_index_sequence<S::kAtOnce>{}),
+RISORIUS_INLINE void add_all(typename S::Sum* sums, const float* rows, const std::uint16_t* bones,
+                             const float* weights, std::size_t fours,
+                             std::index_sequence<kVertex...>) {
+  typename S::Sum own[] = {(static_cast<void>(kVertex), S::zero())...};
+  for (; fours > 0; --fours, bones += 4 * kSkinGroup, weights += 4 * kSkinGroup) {
+    (add_four<S>(own[kVertex], rows, bones + 4 * kVertex, weights + 4 * kVertex,
+                 std::make_index_sequence<4>{}),
      ...);
   }
-  for (; i < n; ++i) {
-    (add_all<S>(sums[kVertex], rows, bones + kVertex * n + i, weights + kVertex * n + i,
-                std::make_index_sequence<1>{}),
-     ...);
+  ((sums[kVertex] = own[kVertex]), ...);
+}
+
+template <class S>
+RISORIUS_INLINE void add_group(typename S::Sum* sums, const float* rows, const std::uint16_t* bones,
+                               const float* weights, std::size_t fours) {
+  for (std::size_t v = 0; v < kSkinGroup; v += S::kTogether) {
+    add_all<S>(sums + v, rows, bones + 4 * v, weights + 4 * v, fours,
+               std::make_index_sequence<S::kTogether>{});
+  }
+}
+
+template <class S, std::size_t... kVertex>
+RISORIUS_INLINE void finish_group(const typename S::Sum* sums, const std::uint16_t* vertices,
+                                  const float* points, float* out,
+                                  std::index_sequence<kVertex...>) {
+  if constexpr (requires { S::finish_four(sums, points, out); }) {
+    if (vertices[3] - vertices[0] == 3) {  // they ascend, so these are neighbours
+      const std::size_t at = std::size_t{vertices[0]} * 3;
+      return S::finish_four(sums, points + at, out + at);
+    }
   }
   (S::finish(sums[kVertex], points + std::size_t{vertices[kVertex]} * 3,
              out + std::size_t{vertices[kVertex]} * 3),
    ...);
+}
+
+RISORIUS_INLINE void copy_points(const std::uint16_t* vertices, std::size_t n, const float* points,
+                                 float* out) {
+  for (; n > 0; --n, ++vertices) {
+    for (std::size_t i = std::size_t{*vertices} * 3, end = i + 3; i < end; ++i) out[i] = points[i];
+  }
 }
 
 template <class S>
@@ -60,24 +90,26 @@ RISORIUS_TARGET void skin(const float* rows, const SkinPart& part, const float* 
   const std::uint16_t* bones = part.bones;
   const float* weights = part.weights;
   for (const SkinRun* run = part.runs; run < part.runs + part.run_count; ++run) {
-    const std::size_t n = run->influences;
+    const std::size_t fours = run->fours, step = fours * 4 * kSkinGroup;
     std::size_t left = run->vertices;
-    if (n == 0) {
-      for (; left > 0; --left, ++vertices) {
-        for (std::size_t i = std::size_t{*vertices} * 3, end = i + 3; i < end; ++i) {
-          out[i] = points[i];
-        }
-      }
+    if (fours == 0) {
+      copy_points(vertices, left, points, out);
+      vertices += left;
       continue;
     }
-    for (; left >= S::kInFlight; left -= S::kInFlight) {
-      skin_some<S>(rows, bones, weights, n, vertices, points, out,
-                   std::make_index_sequence<S::kInFlight>{});
-      vertices += S::kInFlight, bones += S::kInFlight * n, weights += S::kInFlight * n;
+    typename S::Sum sums[kSkinGroup];
+    for (; left >= kSkinGroup; left -= kSkinGroup) {
+      add_group<S>(sums, rows, bones, weights, fours);
+      finish_group<S>(sums, vertices, points, out, std::make_index_sequence<kSkinGroup>{});
+      vertices += kSkinGroup, bones += step, weights += step;
     }
-    for (; left > 0; --left) {
-      skin_some<S>(rows, bones, weights, n, vertices, points, out, std::make_index_sequence<1>{});
-      vertices += 1, bones += n, weights += n;
+    if (left > 0) {
+      add_group<S>(sums, rows, bones, weights, fours);
+      for (std::size_t v = 0; v < left; ++v) {
+        const std::size_t at = std::size_t{vertices[v]} * 3;
+        S::finish(sums[v], points + at, out + at);
+      }
+      vertices += left, bones += step, weights += step;
     }
   }
 }

@@ -93,7 +93,7 @@ py::array_t<float> evaluate_skin(const rig::Skin& skin, const py::object& points
       before(to.data(), from.data() + from.size())) {
     throw py::value_error("out: points, or an array that does not overlap them, was expected");
   }
-  core::AlignedVector<float> rows(skin.bone_count * simd::kSkinRow);
+  core::AlignedVector<float> rows((std::size_t{skin.bone_count} + 1) * simd::kSkinRow);
   float* finished = to.mutable_data();
   const py::gil_scoped_release released;
   kernels.skin_rows(moved.data(), skin.bone_count, rows.data());

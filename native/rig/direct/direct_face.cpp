@@ -131,7 +131,7 @@ DirectFace::DirectFace(FaceParts parts)
   affine_.resize(bones);
   matrices_.resize(bones * 12);
   last_matrices_.resize(bones * 12);
-  rows_.resize(bones * simd::kSkinRow);
+  rows_.resize((bones + 1) * simd::kSkinRow);  // the last is of no bone
   weights_.resize(parts_.rig->blend_shape_count);
   bone_changed_.resize(bones);
   channel_changed_.resize(weights_.size());

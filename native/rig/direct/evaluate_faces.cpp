@@ -9,7 +9,7 @@
 namespace risorius::rig {
 namespace {
 
-// Vertices that are worth a thread: to begin one takes as long as to skin so many.
+// To begin a thread takes as long as to skin so many vertices.
 constexpr std::size_t kWorthAThread = 8192;
 
 // One list of work for all threads: first every face is begun, then come the blocks of its meshes.
@@ -76,8 +76,10 @@ class Work {
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads) {
   Work work(faces, frames);
-  if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
-  threads = std::clamp<std::size_t>(work.vertices() / kWorthAThread, 1, threads);
+  if (threads == 0) {
+    threads = std::max(1u, std::thread::hardware_concurrency());
+    threads = std::clamp<std::size_t>(work.vertices() / kWorthAThread, 1, threads);
+  }
   core::parallel_for(threads, threads, [&](std::size_t, std::size_t) { work.run(); });
   for (std::size_t f = 0; f < faces.size(); ++f) {
     for (const Target& target : frames[f].targets) {

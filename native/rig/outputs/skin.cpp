@@ -68,42 +68,59 @@ float divisor(std::span<const float> weights) {
   return sum > kLeastWeight && std::isfinite(sum) ? sum : 0.0f;
 }
 
-// The influences of a vertex that move it.
-std::uint32_t count_of(std::span<const float> weights) {
+// How often four influences move a vertex.
+std::uint32_t fours_of(std::span<const float> weights) {
   if (divisor(weights) == 0) return 0;
-  return static_cast<std::uint32_t>(weights.size()) -
-         static_cast<std::uint32_t>(std::ranges::count(weights, 0.0f));
+  const auto none = static_cast<std::size_t>(std::ranges::count(weights, 0.0f));
+  return static_cast<std::uint32_t>((weights.size() - none + 3) / 4);
 }
 
-void add_vertex(const Lists& lists, std::size_t v, Skin& skin) {
-  const std::size_t begin = lists.offsets[v], n = lists.offsets[v + 1] - begin;
-  const float sum = divisor(lists.weights.subspan(begin, n));
-  for (std::size_t i = begin; sum != 0 && i < begin + n; ++i) {
-    if (lists.weights[i] == 0) continue;
-    skin.bones.push_back(static_cast<std::uint16_t>(lists.bones[i]));
-    skin.weights.push_back(lists.weights[i] / sum);
+std::span<const float> weights_of(const Lists& lists, std::size_t v) {
+  return lists.weights.subspan(lists.offsets[v], lists.offsets[v + 1] - lists.offsets[v]);
+}
+
+// In: at  of the first influence of its group, place  of the vertex in the group
+void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t place, Skin& skin) {
+  const std::span<const float> weights = weights_of(lists, v);
+  const float sum = divisor(weights);
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] == 0) continue;
+    const std::size_t to = at + (n / 4 * simd::kSkinGroup + place) * 4 + n % 4;
+    skin.bones[to] = static_cast<std::uint16_t>(lists.bones[lists.offsets[v] + i]);
+    skin.weights[to] = weights[i] / sum;
+    ++n;
   }
 }
 
-// The vertices [begin, end), by the number of their influences and then in their order.
+// A run of vertices, which begins at `begin` of the block.
+void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_t> vertices,
+             std::uint32_t fours, Skin& skin) {
+  skin.runs.push_back({static_cast<std::uint32_t>(vertices.size()), fours});
+  skin.vertices.insert(skin.vertices.end(), vertices.begin(), vertices.end());
+  for (std::size_t v = 0; fours > 0 && v < vertices.size(); ++v) {
+    const std::size_t size = std::size_t{fours} * 4 * simd::kSkinGroup;
+    if (v % simd::kSkinGroup == 0) {
+      skin.bones.resize(skin.bones.size() + size, static_cast<std::uint16_t>(skin.bone_count));
+      skin.weights.resize(skin.weights.size() + size);
+    }
+    put_vertex(lists, begin + vertices[v], skin.bones.size() - size, v % simd::kSkinGroup, skin);
+  }
+}
+
+// The vertices [begin, end), by how many influences they have and then in their order.
 void add_block(const Lists& lists, std::uint32_t begin, std::uint32_t end, Skin& skin) {
-  std::vector<std::uint32_t> counts(end - begin);
-  for (std::uint32_t v = begin; v < end; ++v) {
-    const std::size_t at = lists.offsets[v];
-    counts[v - begin] = count_of(lists.weights.subspan(at, lists.offsets[v + 1] - at));
-  }
+  std::vector<std::uint32_t> fours;
+  for (std::uint32_t v = begin; v < end; ++v) fours.push_back(fours_of(weights_of(lists, v)));
   std::vector<std::uint16_t> order(end - begin);
   std::iota(order.begin(), order.end(), std::uint16_t{0});
-  std::ranges::stable_sort(order, {}, [&](std::uint16_t v) { return counts[v]; });
-  const std::size_t first = skin.runs.size();
-  skin.blocks.push_back({static_cast<std::uint32_t>(first), skin.bones.size()});
-  for (const std::uint16_t v : order) {
-    if (skin.runs.size() == first || skin.runs.back().influences != counts[v]) {
-      skin.runs.push_back({0, counts[v]});
-    }
-    ++skin.runs.back().vertices;
-    skin.vertices.push_back(v);
-    add_vertex(lists, begin + v, skin);
+  const auto key = [&fours](std::uint16_t v) { return fours[v]; };
+  std::ranges::stable_sort(order, {}, key);
+  skin.blocks.push_back({static_cast<std::uint32_t>(skin.runs.size()), skin.bones.size()});
+  for (auto at = order.begin(); at != order.end();) {
+    const auto next = std::ranges::upper_bound(at, order.end(), key(*at), {}, key);
+    add_run(lists, begin, {at, next}, key(*at), skin);
+    at = next;
   }
 }
 
@@ -118,9 +135,9 @@ Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t
                        std::span<const std::uint32_t> bones, std::span<const float> weights,
                        std::uint32_t bone_count) {
   const Lists lists{offsets, bones, weights};
-  if (bone_count > 0x10000) {
+  if (bone_count > 0xFFFF) {
     return fail(ErrorCode::kLimitExceeded, "bone_count",
-                "at most 65536 bones were expected" + found(bone_count));
+                "at most 65535 bones were expected" + found(bone_count));
   }
   RISORIUS_TRY(check_offsets(vertex_count, lists));
   RISORIUS_TRY(check_influences(lists, vertex_count, bone_count));
@@ -128,14 +145,15 @@ Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t
   skin.vertex_count = vertex_count, skin.bone_count = bone_count;
   skin.vertices.reserve(vertex_count);
   skin.bones.reserve(bones.size());
-  skin.weights.reserve(bones.size() + simd::kWidest);
+  skin.weights.reserve(bones.size());
   for (std::uint32_t v = 0; v < vertex_count; v += std::min(kSkinBlock, vertex_count - v)) {
     add_block(lists, v, v + std::min(kSkinBlock, vertex_count - v), skin);
   }
   skin.blocks.push_back({static_cast<std::uint32_t>(skin.runs.size()), skin.bones.size()});
-  skin.weights.resize(skin.weights.size() + simd::kWidest);
-  std::vector<std::uint8_t> used(bone_count);
-  for (const std::uint16_t bone : skin.bones) used[bone] = 1;
+  skin.bones.shrink_to_fit();
+  skin.weights.shrink_to_fit();
+  std::vector<std::uint8_t> used(std::size_t{bone_count} + 1);
+  for (const std::uint16_t bone : skin.bones) used[bone] = 1;  // and that of none
   for (std::uint32_t b = 0; b < bone_count; ++b) {
     if (used[b] != 0) skin.bones_used.push_back(static_cast<std::uint16_t>(b));
   }

@@ -245,7 +245,7 @@ def test_a_chain_says_what_is_wrong(parents, matrices, message):
         ((1, [0, 1], [-1], [1], 3), "bones: values from 0"),
         ((1, [0, 1], [0.0], [1], 3), "bones: whole numbers"),
         ((1, [0, 1], [0], "x", 3), "weights: an array of numbers"),
-        ((1, [0, 1], [0], [1], 65537), "at most 65536 bones"),
+        ((1, [0, 1], [0], [1], 65536), "at most 65535 bones"),
     ],
 )
 def test_a_skin_says_what_is_wrong(arguments, message):
