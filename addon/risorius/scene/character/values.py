@@ -50,9 +50,8 @@ def _fill_unheard(
             _fill(seen, parts.MAPS, maps)
     for item in parts.meshes_of(rig):
         for slot in item.material_slots:
-            tree = slot.material.node_tree if slot.material is not None else None
-            if tree is not None and next(materials.map_drivers(slot.material), None):
-                tree.update_tag()
+            if slot.material is not None and next(materials.map_drivers(slot.material), None):
+                compat.tree_of(slot.material).update_tag()
 
 
 def _fill(owner: bpy.types.Object, name: str, values: NDArray[np.float32]) -> bool:

@@ -379,6 +379,8 @@ def unregister() -> None:
     heat.end_all()
     if look_masks.take_away():
         refresh()
+    for rig in parts.rigs():
+        ordinary.leave(rig)
     for name, handler in reversed(_there()):
         present = getattr(bpy.app.handlers, name)
         if handler in present:

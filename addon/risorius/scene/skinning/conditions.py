@@ -63,6 +63,8 @@ class _Kept:
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
 # Mesh objects that were written to since Blender last told of updates: these are no edits.
 _written: set[int] = session.keep("conditions.written", set, ("undo", "load"))
+# Objects of the user's -> what they point to, see _pointed.
+_pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
 # Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
@@ -162,8 +164,41 @@ class _Edits:
         elif parts.CONTROLS in item:
             if update.is_updated_geometry:
                 self.rigs.add(uid)
-        elif parts.RIG not in item:
+        elif parts.RIG not in item and _may_read_anew(item):
             self.foreign = True
+
+
+def _may_read_anew(item: bpy.types.Object) -> bool:
+    """Whether an object of the user's points to other objects than when it was last looked at.
+
+    A lamp that is dragged is edited at each step, and reads no face.
+    """
+    if any(modifier.type == "NODES" for modifier in item.modifiers):
+        return True  # inputs of geometry nodes are objects, too
+    pointed = _pointed(item)
+    if _pointing.get(item.session_uid) == pointed:
+        return False
+    _pointing[item.session_uid] = pointed
+    return True
+
+
+def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
+    """What an object points to by parent, constraints, modifiers and drivers."""
+    bones = item.pose.bones if item.pose is not None else ()
+    holds = [*item.constraints, *(hold for bone in bones for hold in bone.constraints)]
+    targets = [
+        (_uid(getattr(hold, "target", None)), getattr(hold, "subtarget", "")) for hold in holds
+    ]
+    modifiers = [_uid(getattr(modifier, "object", None)) for modifier in item.modifiers]
+    data = item.animation_data
+    count = len(data.drivers) if data is not None else 0
+    parent = (_uid(item.parent), item.parent_type, item.parent_bone)
+    return parent, tuple(targets), tuple(modifiers), count
+
+
+def _uid(thing: object) -> int:
+    """The session uid of a datablock, 0 of anything else: no Blender object is kept."""
+    return thing.session_uid if isinstance(thing, bpy.types.ID) else 0
 
 
 def note_updates(depsgraph: Depsgraph) -> set[int]:
