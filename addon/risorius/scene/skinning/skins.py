@@ -60,9 +60,9 @@ _skins: dict[int, Skin] = session.table("skins.skins", ("load",))
 _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
 
 
-@session.at("undo")
+@session.at("rewrite", "undo")
 def doubt() -> None:
-    """After undo a skin is compared with its mesh before it is used again."""
+    """After undo, or another file's data, a skin is compared with its mesh before it is used."""
     _unsure.update(_skins)
 
 
@@ -96,7 +96,7 @@ def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     """
     uid = item.session_uid
     kept = _skins.get(uid)
-    if kept is not None and uid in _unsure and kept.mark != _mark(item):
+    if kept is not None and uid in _unsure and not _is_as_read(kept, item):
         kept = None
     _unsure.discard(uid)
     if kept is None:
@@ -184,6 +184,10 @@ def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
     places = np.full(max(len(groups_there), int(groups.max(initial=-1)) + 1), -1, np.int64)
     places[: len(groups_there)] = [bones.names.get(group.name, -1) for group in groups_there]
     return counts, places[groups], weights
+
+
+def _is_as_read(skin: Skin, item: MeshObject) -> bool:
+    return skin.mark == _mark(item) and np.array_equal(skin.base, meshes.basis_of(item))
 
 
 def _mark(item: MeshObject) -> tuple[object, ...]:
