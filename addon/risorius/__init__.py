@@ -27,3 +27,11 @@ def glTF2_pre_export_callback(settings: Mapping[str, object]) -> None:
     from . import registration
 
     registration.before_gltf(settings)
+
+
+def glTF2_post_export_callback(settings: Mapping[str, object]) -> None:
+    """Blender's glTF exporter calls this after it has written. Args: settings  the exporter's."""
+    del settings
+    from . import registration
+
+    registration.after_gltf()

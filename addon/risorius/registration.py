@@ -10,6 +10,7 @@ from .language import tables
 from .scene.animation import layer_properties, range_properties
 from .scene.base import compat, console, session
 from .scene.events import handlers
+from .scene.export import ordinary_form
 from .scene.gaze import gaze_settings
 from .scene.live import capture
 from .scene.speech import spoken_properties
@@ -163,6 +164,7 @@ def register() -> None:
         if sentence:
             console.say(sentence)
     handlers.register()
+    ordinary_form.register()
     paste_flipped.register()
     capture.register()
     drag_tool.register()
@@ -178,6 +180,13 @@ def before_gltf(settings: Mapping[str, object]) -> None:
     """
     if not _idle:
         live_faces.before_gltf(settings)
+        ordinary_form.begin(ordinary_form.GLTF)
+
+
+def after_gltf() -> None:
+    """Called after Blender's own glTF exporter has written."""
+    if not _idle:
+        ordinary_form.end(ordinary_form.GLTF)
 
 
 def _refresh_once() -> None:
@@ -199,6 +208,7 @@ def unregister() -> None:
     drag_tool.unregister()
     capture.unregister()
     paste_flipped.unregister()
+    ordinary_form.unregister()
     handlers.unregister()
     manual.unregister()
     timing_overlay.stop()

@@ -21,7 +21,7 @@ def _baked(dna_file, mode):
 
 
 def _told(rig):
-    return scene.submodule("scene.frame.caches").words(rig)
+    return scene.submodule("scene.skinning.caches").words(rig)
 
 
 def _rig():
@@ -54,7 +54,7 @@ def test_caches_of_older_files_are_told_until_they_are_baked_again(old, dna_file
     assert not _told(rig)
     rig = _reopened(tmp_path / "again.blend")
     assert not _told(rig)
-    assert scene.controls(rig)[VERSION] == 3
+    assert scene.controls(rig)[VERSION] == 4
 
 
 def test_each_frame_in_a_process_of_its_own(dna_file, tmp_path):

@@ -78,7 +78,7 @@ def _fill(dna_file):
     assert len(scene.submodule("scene.see_why.causes").strongest(rig)) == 1
     assert bpy.ops.risorius.heat(kind="POSE") == {"FINISHED"}
     assert bpy.ops.risorius.copy_pose() == {"FINISHED"}
-    assert not scene.submodule("scene.frame.caches").note_old(rig)
+    assert not scene.submodule("scene.skinning.caches").note_old(rig)
     scene.submodule("ui.see_why.panel")._ask_soon()
     _frame()
     return rig

@@ -105,6 +105,9 @@ def test_head_and_neck_of_a_body_of_any_name_and_scale(dna_file, names, scale, t
         body.pose.bones[name].rotation_quaternion = Quaternion((1, 0.4, 0.2), angle)
     scene.update(body)
     bpy.context.view_layer.update()
+    turned_direct = scene.snapshot(rig)
+    scene.pose_bones(rig)
+    np.testing.assert_allclose(scene.snapshot(rig), turned_direct, atol=1e-5)
     turned = _world(rig, joint).to_quaternion() @ straight.inverted()
     wanted = _world(body, head).to_quaternion() @ before.inverted()
     assert turned.rotation_difference(wanted).angle < 2e-3

@@ -190,7 +190,7 @@ def test_a_mesh_of_other_topology_is_left_alone(mode, dna_file):
     bpy.ops.mesh.subdivide()
     bpy.ops.object.mode_set(mode="OBJECT")
     count, keys = len(head.data.vertices), len(_keys(rig))
-    _switch("KEYS" if mode == "LIVE" else "LIVE")
+    _switch("KEYS" if mode != "KEYS" else "LIVE")
     assert (len(head.data.vertices), len(_keys(rig))) == (count, keys)
 
 
@@ -285,7 +285,7 @@ def test_the_panel_draws_with_and_without_a_test(dna_file):
 
 
 def test_only_shapes_that_move_something_are_offered(dna_file):
-    rig = scene.load(dna_file)
+    rig = scene.load(dna_file, "KEYS")
     items = scene.submodule("ui.face.channel_preview")._channels(None, bpy.context)
     assert [i[1] for i in items] == [b.name for b in _keys(rig)[1:]]
     with pytest.raises(TypeError):

@@ -62,7 +62,7 @@ def two_eyed(path, shift=0.0):
 
 @pytest.fixture
 def rig(tmp_path):
-    rig = scene.load(two_eyed(tmp_path / "eyes.dna", shift=0.4))
+    rig = scene.load(two_eyed(tmp_path / "eyes.dna", shift=0.4), "LIVE")  # with posed bones
     bpy.context.view_layer.objects.active = scene.controls(rig)
     return rig
 

@@ -151,12 +151,13 @@ OTHERS = {
     "the tool in the hand, and what is shown of it": "drag_tool drag_hover",
     "the range of sliders: keys are cut as well": "set_overdrive",
     "drivers; each side shows what it showed": "link_sides",
-    "what is shown, and why": "frame_board frame_face heat hide_hints hide_outlines mask_renders "
-    "move_outlines mute set_strands show_all solo why_vertex",
+    "what is shown, and why": "frame_board frame_face heat hide_hints hide_joints hide_outlines "
+    "mask_renders move_outlines mute set_strands show_all solo why_vertex",
     "reads the controls": "copy_pose make_pose_assets save_expression update_expression "
     "render_thumbnails",
     "files of expressions": "rename_expression delete_expression star_expression "
     "export_expressions import_expressions",
+    "how the skin is deformed": "prepare_for_export",
     "who leads; the pose stays": "add_board remove_board lead",
     "selects, pins, hides": "select_board pin clear_pins select_handle hide_handles show_handles",
     "lies above the sliders": "layer_add layer_remove layer_move layer_duplicate layer_warp "

@@ -117,7 +117,7 @@ def test_only_new_faces_are_written(dna_file, port):
 
 
 def test_the_head_turns(dna_file, port):
-    rig = scene.load(dna_file)
+    rig = scene.load(dna_file, "LIVE")
     bone = scene.controls(rig).pose.bones["head"]
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = (0.1, 0.2, 0.3)

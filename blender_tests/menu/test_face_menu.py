@@ -12,7 +12,7 @@ from support.layout import Recorder
 ELSEWHERE = {
     *("apply_pose_asset", "blend_pose_asset", "blend_expression", "delete_expression"),
     *("rename_expression", "star_expression", "update_expression", "render_thumbnails"),
-    *("save_expression", "favourite", "hide_hints", "shortcut", "install_speech"),
+    *("save_expression", "favourite", "hide_hints", "hide_joints", "shortcut", "install_speech"),
     *("layer_add", "layer_move", "unfire", "fire", "solo", "mask_renders", "test_channel"),
     *("drag", "drag_hover", "pin", "select_handle", "paste_pose_flipped"),
     *("live_subject", "live_finish", "live_discard", "live_neutral", "learn_range_live"),

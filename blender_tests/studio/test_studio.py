@@ -161,8 +161,11 @@ def test_no_shirt_ends_in_the_picture(rig):
     shirt = next(m for m in scene.meshes(man).values() if "shirt" in m.name)
     end = scene.controls(man).data.bones["eye_L"].head_local.z - 0.2
     raised = [v for v in shirt.data.vertices if abs(v.co.x) < 0.07 and v.co.z < end]
+    basis = shirt.data.shape_keys.reference_key
     for vertex in raised:
-        vertex.co.z = end
+        vertex.co.z = basis.points[vertex.index].co.z = end
+    shirt.data.update()
+    bpy.context.view_layer.update()
     bpy.context.view_layer.objects.active = scene.controls(man)
     camera = _camera(_add())
     bpy.context.scene.render.resolution_x = bpy.context.scene.render.resolution_y = 100

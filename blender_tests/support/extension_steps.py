@@ -76,16 +76,22 @@ def install(package):
     return of_ours()
 
 
+def _vertices(item):
+    """What is shown of a mesh."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    return [tuple(v.co) for v in item.evaluated_get(graph).data.vertices]
+
+
 def use(path):
     """Import a face, move it, save the scene beside the file."""
     assert bpy.ops.risorius.import_dna(filepath=path) == {"FINISHED"}
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     bone = rig["risorius_controls"].pose.bones["face"]
-    before = [tuple(b.location) for b in rig.pose.bones]
+    before = _vertices(rig["risorius_mesh_000"])
     bone["CTRL_expressions.jawOpen"] = 1.0
     rig["risorius_controls"].update_tag()
     bpy.context.view_layer.update()
-    moved = [tuple(b.location) for b in rig.pose.bones] != before
+    moved = _vertices(rig["risorius_mesh_000"]) != before
     bpy.ops.wm.save_as_mainfile(filepath=str(Path(path).with_suffix(".blend")))
     import risorius
 
@@ -104,15 +110,11 @@ def add(_nothing=""):
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     head = next(o for o in bpy.data.objects if o.type == "MESH" and "head" in o.name)
 
-    def vertices():
-        graph = bpy.context.evaluated_depsgraph_get()
-        return [tuple(v.co) for v in head.evaluated_get(graph).data.vertices]
-
-    before = vertices()
+    before = _vertices(head)
     rig["risorius_controls"].pose.bones["face"]["CTRL_expressions.jawOpen"] = 1.0
     rig["risorius_controls"].update_tag()
     bpy.context.view_layer.update()
-    after = vertices()
+    after = _vertices(head)
     return {
         "name": rig.name.removesuffix("_rig"),
         "moved": sum(a != b for a, b in zip(before, after, strict=True)),

@@ -144,8 +144,18 @@ def routes_of(name):
     return [route for route in ROUTES if route not in skipped]
 
 
+def show(mode):
+    """Show all faces that are no overrides in Direct mode ("AUTO"), or with bones ("LIVE")."""
+    for rig in rigs():
+        if rig.library is None and rig.override_library is None:
+            rig["risorius_skinning"] = mode
+            rig["risorius_controls"].update_tag()
+    bpy.context.view_layer.update()
+
+
 def prepare(play):
-    """What is done with the open file before it plays."""
+    """What is done with the open file before it plays, as files of the past do: with bones."""
+    show("LIVE")
     if play != AS_SAVED:
         bpy.context.scene["touched"] = True
     for rig, item in [(r, r["risorius_controls"]) for r in rigs()]:
@@ -173,15 +183,20 @@ def _choose_slot(item):
         data.action_slot = data.action_slot or data.action.slots[0]
 
 
-def film(frames=FRAMES):
-    """What the faces of the open file play: {"face/frame/what": float32[...]}."""
+def film(frames=FRAMES, read=None):
+    """What the faces of the open file play: {"face/frame/what": float32[...]}.
+
+    Args:
+        frames: what is played, in this order.
+        read: gives what of a face, in a depsgraph; None for its bones, keys, channels and maps.
+    """
     found = {}
     for frame in frames:
         bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
         bpy.context.view_layer.update()
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for rig in rigs():
-            for what, values in _read(rig, depsgraph).items():
+            for what, values in (read or _read)(rig, depsgraph).items():
                 found[f"{rig.name}/{frame:g}/{what}"] = values
     return found
 
@@ -210,6 +225,27 @@ def _read(rig, depsgraph):
             live.points.foreach_get("co", points)
             found[f"points{number}"] = points
     return found
+
+
+def vertices(rig, depsgraph):
+    """What `film` reads of a face for its looks: the vertices of each mesh, in world space."""
+    found = {}
+    for key in sorted(k for k in rig.keys() if k.startswith("risorius_mesh_")):  # noqa: SIM118
+        seen = rig[key].evaluated_get(depsgraph)
+        points = np.empty(len(seen.data.vertices) * 3, np.float32)
+        seen.data.vertices.foreach_get("co", points)
+        place = np.array(seen.matrix_world)
+        found[key] = points.reshape(-1, 3) @ place[:3, :3].T + place[:3, 3]
+    return found
+
+
+def direct_rigs():
+    """The faces that are in Direct mode now: one of their meshes at least has final positions."""
+    return [
+        rig
+        for rig in rigs()
+        if any("risorius_finished" in rig[k] for k in rig.keys() if k.startswith("risorius_mesh_"))  # noqa: SIM118
+    ]
 
 
 def _numbers(bone):

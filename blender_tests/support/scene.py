@@ -109,6 +109,12 @@ def curves(item):
     return list(data.action.fcurves)
 
 
+def pose_bones(rig):
+    """Let a face leave Direct mode: the bones of its deforming armature are posed from now on."""
+    rig["risorius_skinning"] = "LIVE"
+    update(controls(rig))
+
+
 def snapshot(rig):
     """Vertices of all meshes of a character, joined."""
     return np.concatenate([evaluated(m) for _, m in sorted(meshes(rig).items())])

@@ -40,7 +40,8 @@ def test_save_and_reload_with_the_source_gone(mode, dna_file, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     dna_file.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    np.testing.assert_array_equal(scene.snapshot(_rig()), before)
+    near = 1e-6 if mode == "AUTO" else 0.0  # the file has posed bones, which Blender adds up
+    np.testing.assert_allclose(scene.snapshot(_rig()), before, rtol=0, atol=near)
     again = tmp_path / "again.dna"
     again.write_bytes(content)
     _moves_and_is_right(_rig(), again)
@@ -98,7 +99,9 @@ def test_duplicate_is_independent(mode, dna_file, linked):
     ours, theirs = scene.meshes(rig)[0], scene.meshes(copy)[0]
     assert ours.data.shape_keys != theirs.data.shape_keys
     assert ours.material_slots[0].material != theirs.material_slots[0].material
-    for item, owner in ((ours, rig), (theirs, copy)):
+    for item, face in ((ours, rig), (theirs, copy)):
+        owner = next(m for m in scene.meshes(face).values() if "maps" in m)
+        assert list(owner["maps"]) == list(face["maps"])
         curves = item.material_slots[0].material.node_tree.animation_data.drivers
         assert {c.driver.variables[0].targets[0].id for c in curves} == {owner}
     _moves_and_is_right(rig, dna_file)

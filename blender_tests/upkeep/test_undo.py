@@ -53,7 +53,7 @@ def _lod(chance, rig):
 
 def _mode(chance, rig):
     _activate(rig)
-    bpy.ops.risorius.set_shape_mode(mode=chance.choice(("LIVE", "KEYS")))
+    bpy.ops.risorius.set_shape_mode(mode=chance.choice(("AUTO", "LIVE", "KEYS")))
 
 
 def _duplicate(_chance, rig):
@@ -92,7 +92,7 @@ def test_a_hundred_steps_back_and_forth(dna_file, seed):
     chance = random.Random(seed)
     edit = bpy.context.preferences.edit
     edit.use_global_undo, edit.undo_steps = True, STEPS + 10
-    for mode in ("LIVE", "KEYS"):
+    for mode in ("AUTO", "KEYS"):
         scene.load(dna_file, mode, lods=(True, True, *(False,) * 6))
     bpy.ops.ed.undo_push(message="start")
     states = [_state()]

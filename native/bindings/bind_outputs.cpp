@@ -33,14 +33,7 @@ FloatArray matrix_argument(const py::object& object, const char* name, py::ssize
 // A caller's array is written in place, or a new one is made.
 py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
   if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
-  if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
-    throw py::value_error("out: a C-contiguous float32 array was expected");
-  }
-  auto out = object.cast<py::array_t<float>>();
-  if (out.ndim() != 2 || out.shape(0) != rows || out.shape(1) != 3) {
-    shape_error("out", "(" + std::to_string(rows) + ", 3)", out);
-  }
-  if (!out.writeable()) throw py::value_error("out: the array is read-only");
+  const py::array_t<float> out = written_argument(object, "out", rows);
   const std::less<const float*> before;
   if (base != nullptr && before(base, out.data() + rows * 3) &&
       before(out.data(), base + rows * 3)) {

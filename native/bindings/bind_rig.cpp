@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <list>
 
+#include "bindings/direct/pose_arrays.h"
 #include "bindings/numpy_arrays.h"
 #include "compile/compile.h"
 #include "core/parallel_for.h"
@@ -19,10 +20,6 @@ namespace risorius::bindings {
 namespace {
 
 using RigPtr = std::shared_ptr<const rig::Rig>;
-
-struct PoseArrays {
-  FloatArray joints, blend_shapes, animated_maps, controls;
-};
 
 struct PyInstance {
   RigPtr rig;
@@ -50,11 +47,6 @@ py::array_t<float> copied(std::span<const float> values, std::vector<py::ssize_t
 py::ssize_t stride_of(const rig::Rig& rig) { return static_cast<py::ssize_t>(rig.joint_stride); }
 
 py::ssize_t length(std::uint32_t n) { return static_cast<py::ssize_t>(n); }
-
-rig::PoseView view_of(PoseArrays& out) {
-  return {out.joints.mutable_data(), out.blend_shapes.mutable_data(),
-          out.animated_maps.mutable_data(), out.controls.mutable_data()};
-}
 
 PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
   const auto size = [](const std::vector<float>& v) { return static_cast<py::ssize_t>(v.size()); };
@@ -218,9 +210,7 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
                     bool check) {
   const FloatArray in = vector_argument(raw, "raw", rig.raw_count);
   if (check) unwrap(rig::check_finite(rig, in.data(), 1));
-  PoseArrays out{FloatArray({length(rig.joint_count), stride_of(rig)}),
-                 FloatArray(length(rig.blend_shape_count)),
-                 FloatArray(length(rig.animated_map_count)), FloatArray(length(rig.control_count))};
+  PoseArrays out = new_pose(rig);
   const rig::PoseView pose = view_of(out);
   if (settle) {
     rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);

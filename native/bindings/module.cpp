@@ -9,12 +9,14 @@ namespace risorius::bindings {
 void bind_author(py::module_& m);
 void bind_correct(py::module_& m);
 void bind_clip(py::module_& m);
+void bind_direct(py::module_& m);
 void bind_dna(py::module_& m);
 void bind_edit(py::module_& m);
 void bind_files(py::module_& m);
 void bind_mixer(py::module_& m);
 void bind_outputs(py::module_& m);
 void bind_rig(py::module_& m);
+void bind_skin(py::module_& m);
 void bind_solve(py::module_& m);
 
 namespace {
@@ -54,6 +56,8 @@ PYBIND11_MODULE(_native, m) {
   risorius::bindings::bind_dna(m);
   risorius::bindings::bind_rig(m);
   risorius::bindings::bind_outputs(m);
+  risorius::bindings::bind_skin(m);
+  risorius::bindings::bind_direct(m);
   risorius::bindings::bind_solve(m);
   risorius::bindings::bind_edit(m);
   risorius::bindings::bind_author(m);

@@ -7,6 +7,7 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -28,6 +29,13 @@ PyObject* new_error_type(const char* name, const char* doc);
 template <class T>
 T unwrap(core::Result<T>&& result, const std::string& file = "") {
   if (!result) throw_error(result.error(), file);
+  return std::move(result).value();
+}
+
+/// The same where what is wrong is an argument: raises ValueError.
+template <class T>
+T unwrap_argument(core::Result<T>&& result) {
+  if (!result) throw py::value_error(result.error().describe());
   return std::move(result).value();
 }
 
@@ -80,6 +88,35 @@ inline FloatArray vector_argument(const py::object& object, const char* name, st
     shape_error(name, "(" + std::to_string(length) + ",)", array);
   }
   return array;
+}
+
+/// Numbers as an array of float32 of that shape; NaN and infinity are taken.
+/// Raises ValueError where they are none, or of another shape.
+inline FloatArray shaped_argument(const py::object& object, const char* name,
+                                  const std::vector<py::ssize_t>& shape) {
+  FloatArray array = FloatArray::ensure(object);
+  if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
+  if (!std::equal(shape.begin(), shape.end(), array.shape(), array.shape() + array.ndim())) {
+    std::string text;
+    for (const py::ssize_t n : shape) text += (text.empty() ? "" : ", ") + std::to_string(n);
+    shape_error(name, "(" + text + (shape.size() == 1 ? ",)" : ")"), array);
+  }
+  return array;
+}
+
+/// What a function writes into in place: raises ValueError unless it is a writeable C-contiguous
+/// array of float32 of shape (rows, 3).
+inline py::array_t<float> written_argument(const py::object& object, const char* name,
+                                           py::ssize_t rows) {
+  if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
+    throw py::value_error(std::string(name) + ": a C-contiguous float32 array was expected");
+  }
+  auto out = object.cast<py::array_t<float>>();
+  if (out.ndim() != 2 || out.shape(0) != rows || out.shape(1) != 3) {
+    shape_error(name, "(" + std::to_string(rows) + ", 3)", out);
+  }
+  if (!out.writeable()) throw py::value_error(std::string(name) + ": the array is read-only");
+  return out;
 }
 
 /// Copies any sequence of numbers into a core array. In: name  of the argument, for errors.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <span>
 
 #include "compile/compile.h"
 
@@ -16,6 +17,18 @@ rig::Morph::Delta transformed(const dna::BlendShapeTarget& t, std::size_t i,
   const float x = t.deltas.at(i, 0), y = t.deltas.at(i, 1), z = t.deltas.at(i, 2);
   return {t.vertex_indices[i], m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z,
           m[6] * x + m[7] * y + m[8] * z};
+}
+
+// Of each channel by vertex, so that some vertices are one run; sums of a vertex keep their order.
+void sort_deltas(rig::Morph& morph) {
+  for (std::size_t c = 0; c + 1 < morph.channel_offsets.size(); ++c) {
+    const auto run = std::span(morph.deltas)
+                         .subspan(morph.channel_offsets[c],
+                                  morph.channel_offsets[c + 1] - morph.channel_offsets[c]);
+    if (!std::ranges::is_sorted(run, {}, &rig::Morph::Delta::vertex)) {
+      std::ranges::stable_sort(run, {}, &rig::Morph::Delta::vertex);
+    }
+  }
 }
 
 }  // namespace
@@ -52,6 +65,7 @@ Result<rig::Morph> compile_morph(const dna::Dna& dna, std::size_t mesh_index,
     }
   }
   out.channel_offsets.push_back(static_cast<std::uint32_t>(out.deltas.size()));
+  sort_deltas(out);
   return out;
 }
 

@@ -66,6 +66,25 @@ struct EulerTurns {
   float parity = 1;
 };
 
+/// Vertices one after the other, by groups of kSkinGroup of which the last may have fewer; each has
+/// so many times four influences.
+struct SkinRun {
+  std::uint32_t vertices = 0, fours = 0;
+};
+inline constexpr std::size_t kSkinGroup = 4;
+/// Floats that a bone's matrix takes, as `skin_rows` writes it; it begins on a cache line.
+inline constexpr std::size_t kSkinRow = 16;
+/// Some vertices of a skin, run after run. Of each group of a run, four influences of its first
+/// vertex, of its second .. fourth, then the next four of each; where a vertex has fewer, or a
+/// group has none, there stand weights of 0 and a bone whose row is 0.
+struct SkinPart {
+  const SkinRun* runs = nullptr;
+  std::size_t run_count = 0;
+  const std::uint16_t* vertices = nullptr;  // which of the points each is, ascending in a run
+  const std::uint16_t* bones = nullptr;
+  const float* weights = nullptr;
+};
+
 /// Fewer columns a group than these are best added in the order of memory (add_columns); where
 /// there are more, a list for `columns` takes less time. Measured for each instruction set.
 struct FewColumns {
@@ -112,6 +131,17 @@ struct Kernels {
   ///       rotations  the angles of rotation i are at i * stride, behind them there is room for w
   void (*quaternions)(const EulerTurns& turns, const std::uint16_t* which, std::size_t n,
                       float* rotations, std::size_t stride);
+
+  /// Matrices of bones as `skin` of this table takes them.
+  /// In:  matrices  float32[n, 3, 4], rows
+  /// Out: rows      float32[n, kSkinRow], each less the identity: a bone at rest then adds nothing
+  void (*skin_rows)(const float* matrices, std::size_t n, float* rows);
+  /// out[v] = points[v] + (sum of weight * (M - 1)) points[v]; without influences out[v] =
+  /// points[v]. Influences are added in their order, each vertex by itself. In:  rows    of
+  /// skin_rows, on a cache line
+  ///      points  float32[.., 3]
+  /// Out: out     float32[.., 3]: the vertices of the part alone; may be points
+  void (*skin)(const float* rows, const SkinPart& part, const float* points, float* out);
 
   /// n big-endian numbers of a file in the machine's byte order.
   /// In:   from  the bytes of the numbers, of any alignment

@@ -5,7 +5,7 @@
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
 //   madd(a, b, sum), order(mask), expand(from, order, to) and expand_more (kernels.h, place), where
 //   it has one for many frames orders(mask), and kBlocks, kBatchBlocks: registers of rows at once;
-//   kBatchFrames; Parts: as OneByOne of rotations_body.h.
+//   kBatchFrames; Parts: as OneByOne of rotations_body.h; Skin: as S of skin_body.h.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -14,6 +14,7 @@
 #include "simd/byte_order_body.h"
 #include "simd/kernels.h"
 #include "simd/rotations_body.h"
+#include "simd/skin_body.h"
 
 namespace risorius::simd {
 
@@ -186,6 +187,8 @@ constexpr Kernels make_kernels(const char* name, FewColumns few = {}) {
           place<false>,
           place<true>,
           quaternions<V::Parts>,
+          skin_rows<V::Skin>,
+          skin<V::Skin>,
           native_u16,
           native_u32,
           native_f32,

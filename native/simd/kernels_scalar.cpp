@@ -6,6 +6,7 @@
 #include "simd/byte_order_body.h"
 #include "simd/kernels_inline.h"
 #include "simd/rotations_body.h"
+#include "simd/skin_body.h"
 
 namespace risorius::simd {
 
@@ -75,6 +76,28 @@ void place_more(const Piece* pieces, std::size_t n, const PlacedFrames& frames) 
   }
 }
 
+struct Skin {
+  struct Sum {
+    float m[12];
+  };
+  using Weights = const float*;
+  static constexpr std::size_t kTogether = 1;
+  static Sum zero() { return {}; }
+  static const float* weights(const float* four) { return four; }
+  template <std::size_t kWeight>
+  static void add(Sum& sum, const float* weights, const float* row) {
+    for (std::size_t i = 0; i < 12; ++i) sum.m[i] += weights[kWeight] * row[i];
+  }
+  static void finish(const Sum& sum, const float* point, float* out) {
+    const float x = point[0], y = point[1], z = point[2], from[3] = {x, y, z};
+    for (std::size_t r = 0; r < 3; ++r) {
+      const float* m = sum.m + 4 * r;
+      out[r] = from[r] + ((m[0] * x + m[1] * y) + (m[2] * z + m[3]));
+    }
+  }
+  static void pack(const float* matrix, float* row) { pack_rows(matrix, row); }
+};
+
 }  // namespace
 
 const Kernels& scalar_kernels() {
@@ -88,6 +111,8 @@ const Kernels& scalar_kernels() {
                                    place,
                                    place_more,
                                    quaternions<OneByOne>,
+                                   skin_rows<Skin>,
+                                   skin<Skin>,
                                    native_u16,
                                    native_u32,
                                    native_f32};

@@ -13,6 +13,7 @@
 #endif
 #include "simd/kernels_inline.h"
 #include "simd/rotations_body.h"
+#include "simd/skin_body.h"
 
 namespace risorius::simd {
 
@@ -51,9 +52,39 @@ struct FourByFour {
   }
 };
 
+// A row of the matrix in each register.
+struct RowsOfFour {
+  struct Sum {
+    __m128 r[3];
+  };
+  using Weights = __m128;
+  static constexpr std::size_t kTogether = 2;
+  RISORIUS_INLINE static Sum zero() {
+    return {{_mm_setzero_ps(), _mm_setzero_ps(), _mm_setzero_ps()}};
+  }
+  RISORIUS_INLINE static __m128 weights(const float* p) { return _mm_loadu_ps(p); }
+  template <std::size_t kWeight>
+  RISORIUS_INLINE static void add(Sum& sum, __m128 weights, const float* row) {
+    const __m128 w = _mm_shuffle_ps(weights, weights, kWeight * 0x55);
+    sum.r[0] = _mm_add_ps(sum.r[0], _mm_mul_ps(w, _mm_load_ps(row)));
+    sum.r[1] = _mm_add_ps(sum.r[1], _mm_mul_ps(w, _mm_load_ps(row + 4)));
+    sum.r[2] = _mm_add_ps(sum.r[2], _mm_mul_ps(w, _mm_load_ps(row + 8)));
+  }
+  RISORIUS_INLINE static void finish(const Sum& sum, const float* point, float* out) {
+    const __m128 p = _mm_setr_ps(point[0], point[1], point[2], 1.0f);
+    const __m128 xy = _mm_hadd_ps(_mm_mul_ps(sum.r[0], p), _mm_mul_ps(sum.r[1], p)),
+                 z = _mm_mul_ps(sum.r[2], p);
+    const __m128 moved = _mm_add_ps(p, _mm_hadd_ps(xy, _mm_hadd_ps(z, z)));
+    _mm_storel_pi(reinterpret_cast<__m64*>(out), moved);
+    _mm_store_ss(out + 2, _mm_movehl_ps(moved, moved));
+  }
+  RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_rows(matrix, row); }
+};
+
 // Products and sums are rounded one by one, as in the scalar path.
 struct V {
   using Parts = FourByFour;
+  using Skin = RowsOfFour;
   using Reg = __m128;
   static constexpr std::size_t kLanes = 4, kBlocks = 12, kBatchBlocks = 3;
   static constexpr int kBatchFrames = 4;

@@ -9,7 +9,8 @@ installed. FULL.dna is a file of real size (tests/fullscale/generate.py): 60 of 
 at every frame, keyed in an action that is an NLA strip, with a second strip added on top. Each way
 is `scene.frame_set` with the whole dependency graph; drawing is not in it.
 
-    add-on, LIVE / KEYS / AUTO   the add-on, in each way of keeping shapes
+    add-on, AUTO / LIVE / KEYS   the add-on: Direct, Live and real shape keys
+    floor of AUTO / LIVE         two poses in turn, what the add-on wrote, written by a bare loop
     plain way                    a handler that evaluates the same rig natively and writes all bones
                                  and all key values to the originals, in bulk; real keys, no drivers
     plain way, loops             the same, written one by one
@@ -33,11 +34,12 @@ import time
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(PROJECT / "packaging" / "check" / "blender"))
+sys.path[:0] = [str(PROJECT / "packaging" / "check" / "blender"), str(PROJECT / "tests" / "bench")]
 os.environ.setdefault("BLENDER_USER_RESOURCES", tempfile.mkdtemp(prefix="risorius-bench-"))
 
 import bpy  # noqa: E402 isort: skip
 import addon_utils  # noqa: E402 isort: skip
+import bare_scene  # noqa: E402
 import install_extension  # noqa: E402
 
 ANIMATED = 60  # unless --active says otherwise: captures move 60 to 100
@@ -183,6 +185,20 @@ def plain_way(controls, rig, path, loops):
     return len(rig.pose.bones)
 
 
+def floor(package, rig, frames):
+    """All times in ms of one frame, of a loop that writes what the add-on wrote; it is off then."""
+    bare = bare_scene.Bare([rig])
+    for frame in (frames // 3, frames // 2):
+        bpy.context.scene.frame_set(frame)
+        bare.remember()
+    bpy.ops.preferences.addon_disable(module=package)
+    bare.begin()
+    bpy.app.handlers.frame_change_post.append(bare.write)
+    times = step(frames)
+    bpy.app.handlers.frame_change_post.remove(bare.write)
+    return times
+
+
 def row(way, times, note, base=None):
     """One line of the table."""
     middle = statistics.median(times)
@@ -206,7 +222,7 @@ def measure_full(path, package, frames, clip, active):
         times = step(frames)
         base = base or statistics.median(times)
         row("plain way" + (", loops" if loops else ""), times, f"{count} bones", base)
-    for mode in ("LIVE", "KEYS", "AUTO"):
+    for mode in ("KEYS", "LIVE", "AUTO"):
         empty_scene(package)
         controls, rig, seconds = import_face(path, mode)
         play(controls, clip, frames, active)
@@ -215,7 +231,8 @@ def measure_full(path, package, frames, clip, active):
         words = ", ".join(f"{name} {ms:.2f}" for name, ms in stages.items())
         note = f"import {seconds:.1f} s; own {sum(stages.values()):.2f} ms: {words}"
         row(f"add-on, {mode}", times, note, base)
-    bpy.ops.preferences.addon_disable(module=package)
+        if mode != "KEYS":
+            row(f"floor of {mode}", floor(package, rig, frames), "", base)
     row("curves only", step(frames), "", base)
 
 

@@ -7,8 +7,9 @@ Runs inside the bpy module or an executable (blender -b --python ... --), with t
 installed. FULL.dna is a file of real size (tests/fullscale/generate.py); ten of SAMPLE.dna stand
 in the file that is opened and saved. The floor is measured in the same scene with the add-on off,
 in turn with ours, three times each: frames and slider steps by a bare handler that writes the same
-bones and live keys, two poses in turn, that were read off the add-on before; undo by a plain
-property beside the same write; files and modes as they are. Times are medians in ms.
+finished positions (with --mode LIVE the same bones and live keys), two poses in turn, that were
+read off the add-on before; undo by a plain property beside the same write; files and modes as they
+are. Times are medians in ms.
 """
 
 from __future__ import annotations
@@ -23,11 +24,10 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 import frame_time  # isort: skip  before bpy: it gives Blender a user folder of its own
+import bare_scene
 import bpy
 import install_extension
 import numpy as np
-
-CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
 
 
 def median_ms(action, rounds, before=None):
@@ -69,47 +69,7 @@ def row(name, ours, floor=None, note=""):
     print(f"| {name} | {ours:.1f} | {base} | {ratio} | {note} |", flush=True)
 
 
-class Bare:
-    """The same bones and live keys, written by a loop that knows nothing of faces."""
-
-    def __init__(self, rigs):
-        # Names: an undo makes all objects anew.
-        self.rigs, self.poses, self.turn = [rig.name for rig in rigs], [], 0
-
-    def remember(self):
-        """Keep what stands in the scene now as one of the poses that are written in turn."""
-        pose = []
-        for rig in map(bpy.data.objects.get, self.rigs):
-            bones = {}
-            for name, width in CHANNELS.items():
-                bones[name] = np.empty(len(rig.pose.bones) * width, np.float32)
-                rig.pose.bones.foreach_get(name, bones[name])
-            keys = []
-            for item in rig.children_recursive:
-                key = item.data.shape_keys if item.type == "MESH" else None
-                if key is not None and len(key.key_blocks) == 2 and not item.hide_viewport:
-                    points = np.empty(len(key.key_blocks[1].points) * 3, np.float32)
-                    key.key_blocks[1].points.foreach_get("co", points)
-                    keys.append((item.name, points))
-            pose.append((rig.name, bones, keys))
-        self.poses.append(pose)
-
-    def write(self, *_arguments):
-        self.turn += 1
-        for rig_name, bones, keys in self.poses[self.turn % len(self.poses)]:
-            rig = bpy.data.objects[rig_name]
-            for name, values in bones.items():
-                rig.pose.bones.foreach_set(name, values)
-            rig.update_tag(refresh={"OBJECT"})
-            for item_name, points in keys:
-                item = bpy.data.objects[item_name]
-                key = item.data.shape_keys
-                key.key_blocks[1].points.foreach_set("co", points)
-                key.update_tag()
-                item.data.update_tag()
-
-
-def faces(path, count, mode="LIVE", lods=(0,)):
+def faces(path, count, mode, lods=(0,)):
     """So many characters of a file in an empty scene: [(control armature, deforming armature)]."""
     found = [frame_time.import_face(path, mode, lods)[:2] for _ in range(count)]
     for number, (controls, _) in enumerate(found):
@@ -118,19 +78,20 @@ def faces(path, count, mode="LIVE", lods=(0,)):
     return found
 
 
-def measure_frames(path, package, counts, frames):
+def measure_frames(path, package, counts, frames, mode):
     """Playback of several full-scale faces."""
     for count in counts:
         frame_time.empty_scene(package)
-        found = faces(path, count)
+        found = faces(path, count, mode)
         for controls, _ in found:
             frame_time.animate(controls, frames)
-        bare = Bare([rig for _, rig in found])
+        bare = bare_scene.Bare([rig for _, rig in found])
         for frame in (frames // 3, frames // 2):
             bpy.context.scene.frame_set(frame)
             bare.remember()
 
         def alone(bare=bare):
+            bare.begin()
             bpy.app.handlers.frame_change_post.append(bare.write)
             times = statistics.median(frame_time.step(frames))
             bpy.app.handlers.frame_change_post.remove(bare.write)
@@ -161,17 +122,18 @@ class Slider:
         self.after()
 
 
-def measure_slider(path, package, rounds):
+def measure_slider(path, package, rounds, mode):
     """A slider's step, and its undo and redo."""
     frame_time.empty_scene(package)
-    (controls, rig), *_ = faces(path, 1)
-    bare, drag = Bare([rig]), Slider(controls)
+    (controls, rig), *_ = faces(path, 1, mode)
+    bare, drag = bare_scene.Bare([rig]), Slider(controls)
     for _ in range(2):
         drag()
         bpy.context.view_layer.update()
         bare.remember()
 
     def written():
+        bare.begin()
         bare.write()
         bpy.context.view_layer.update()
 
@@ -203,16 +165,16 @@ def measure_undo(drag, steps=8):
     return undo, redo
 
 
-def measure_switches(path, package, rounds):
+def measure_switches(path, package, rounds, mode):
     """Levels of detail, ways of keeping shapes and edit mode, back and forth."""
     frame_time.empty_scene(package)
-    (controls, rig), *_ = faces(path, 1, lods=range(8))
+    (controls, rig), *_ = faces(path, 1, mode, lods=range(8))
     bpy.context.view_layer.objects.active = controls
     levels = iter([1, 0] * rounds)
     ours = median_ms(lambda: bpy.ops.risorius.set_lod(lod=next(levels)), 2 * rounds)
     row("level of detail, 0 and 1", ours)
-    modes = iter(["KEYS", "LIVE"] * rounds)
-    for name in ("Live to Keys", "Keys to Live"):
+    modes = iter(["KEYS", mode] * rounds)
+    for name in (f"{mode} to KEYS", f"KEYS to {mode}"):
         row(name, median_ms(lambda: bpy.ops.risorius.set_shape_mode(mode=next(modes)), 1))
     head = max((m for m in rig.children_recursive if m.type == "MESH"),
                key=lambda m: len(m.data.vertices))  # fmt: skip
@@ -228,16 +190,16 @@ def measure_switches(path, package, rounds):
     row("edit mode, in and out", *in_turn(package, edited, edited))
 
 
-def measure_files(path, package, rounds, count=10):
+def measure_files(path, package, rounds, mode, count=10):
     """Import, and a .blend with several faces."""
     frame_time.empty_scene(package)
     seconds = []
     for _ in range(rounds):
         frame_time.empty_scene(package)
-        seconds.append(frame_time.import_face(path, "LIVE")[2])
+        seconds.append(frame_time.import_face(path, mode)[2])
     row(f"import of {path.stem}", 1000 * statistics.median(seconds))
     frame_time.empty_scene(package)
-    faces(path, count, lods=range(8))
+    faces(path, count, mode, lods=range(8))
     with tempfile.TemporaryDirectory() as folder:
         blend = str(Path(folder) / "faces.blend")
         save = lambda: bpy.ops.wm.save_as_mainfile(filepath=blend, copy=True)  # noqa: E731
@@ -262,16 +224,17 @@ def main():
     parser.add_argument("--faces", type=int, nargs="+", default=[1, 2, 4, 8])
     parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--mode", choices=("AUTO", "LIVE"), default="AUTO")
     args = parser.parse_args(install_extension.arguments())
     package = install_extension.install(args.extension)
     print(frame_time.machine())
     print("| wait | ms | floor | times the floor | |\n|---|---|---|---|---|")
-    measure_frames(args.full, package, args.faces, args.frames)
-    measure_slider(args.full, package, 5 * args.rounds)
-    measure_switches(args.full, package, args.rounds)
-    measure_files(args.full, package, 3, count=1)
+    measure_frames(args.full, package, args.faces, args.frames, args.mode)
+    measure_slider(args.full, package, 5 * args.rounds, args.mode)
+    measure_switches(args.full, package, args.rounds, args.mode)
+    measure_files(args.full, package, 3, args.mode, count=1)
     if args.sample:
-        measure_files(args.sample, package, args.rounds)
+        measure_files(args.sample, package, args.rounds, args.mode)
 
 
 if __name__ == "__main__":

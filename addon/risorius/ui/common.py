@@ -18,8 +18,8 @@ from .words import of_error, say
 
 _NO_FACE = "Select a face first."
 MODES = (
-    ("AUTO", "Automatic", "Real shape keys where a mesh has few, else the live sum"),
-    ("LIVE", "Live Sum", "One shape key per mesh that is summed natively: fast"),
+    ("AUTO", "Direct", "Finished positions, without posed bones: fastest; Live where needed"),
+    ("LIVE", "Live", "One shape key per mesh below the armature modifier; bones are posed"),
     ("KEYS", "Shape Keys", "Every channel is a real, driven shape key: editable, exportable"),
 )
 

@@ -1037,6 +1037,100 @@ class BoneSpace:
     def evaluate(self, joints: npt.ArrayLike) -> tuple[_F32, _F32, _F32]:
         """float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3])."""
 
+class JointChain:
+    """The bones of an armature: what they keep to how each moves the skin.
+
+    Each bone passes on all of its motion to those below it, shear included.
+    """
+
+    def __init__(self, parents: npt.ArrayLike, rest: npt.ArrayLike) -> None:
+        """parents int[B], -1: none, in any order; rest float[B, 4, 4], armature space."""
+    @property
+    def bone_count(self) -> int: ...
+    def evaluate(
+        self, location: npt.ArrayLike, rotation: npt.ArrayLike, scale: npt.ArrayLike
+    ) -> _F32:
+        """[B, 3], [B, 4] w x y z, [B, 3] -> float32[B, 3, 4], pose times the inverse of rest."""
+
+class Skin:
+    """How much each bone holds of each vertex of a mesh."""
+
+    def __init__(
+        self,
+        vertex_count: _Int,
+        offsets: npt.ArrayLike,
+        bones: npt.ArrayLike,
+        weights: npt.ArrayLike,
+        bone_count: _Int,
+    ) -> None:
+        """offsets int[V + 1]; bones int[N]; weights float32[N], 0 or more, of any sum."""
+    @property
+    def vertex_count(self) -> int: ...
+    @property
+    def bone_count(self) -> int: ...
+    @property
+    def memory_bytes(self) -> int: ...
+    def evaluate(
+        self,
+        points: npt.ArrayLike,
+        matrices: npt.ArrayLike,
+        out: _F32 | None = None,
+        simd: str | None = None,
+    ) -> _F32:
+        """points float32[V, 3], matrices float32[B, 3, 4] of a JointChain -> float32[V, 3]."""
+
+class DirectFace:
+    """A face whose meshes get finished vertices, from frame to frame.
+
+    A mesh of which nothing changed since it was written to the same memory is passed over.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        space: BoneSpace,
+        chain: JointChain,
+        rows: npt.ArrayLike,
+        meshes: Sequence[tuple[Morph, npt.ArrayLike, Skin]],
+        *,
+        turned: npt.ArrayLike = (),
+    ) -> None:
+        """rows int[n]: the bone of chain of each bone of space; base float32[V, 3] of each mesh."""
+    @property
+    def mesh_count(self) -> int: ...
+    def keep(self, location: npt.ArrayLike, rotation: npt.ArrayLike, scale: npt.ArrayLike) -> None:
+        """What the bones of the chain keep that are not in rows: [B, 3], [B, 4], [B, 3]."""
+    def set_base(self, mesh: _Int, base: npt.ArrayLike) -> None: ...
+    def forget(self) -> None:
+        """The next frame writes every mesh."""
+
+def evaluate_faces(
+    faces: Sequence[DirectFace],
+    raw: Sequence[npt.ArrayLike],
+    lods: Sequence[_Int],
+    targets: Sequence[dict[int, _F32 | tuple[int, int]]],
+    *,
+    turns: Sequence[npt.ArrayLike | None] | None = None,
+    anew: bool = False,
+    threads: _Int = 0,
+) -> list[tuple[Pose, tuple[int, ...]]]:
+    """A frame of different faces -> of each (Pose, the meshes that were written).
+
+    targets: of each face {mesh: float32[V, 3], or (address, V) of such memory}.
+    """
+
+def deform_faces(
+    faces: Sequence[DirectFace],
+    joints: Sequence[npt.ArrayLike],
+    blend_shapes: Sequence[npt.ArrayLike],
+    targets: Sequence[dict[int, _F32 | tuple[int, int]]],
+    *,
+    turns: Sequence[npt.ArrayLike | None] | None = None,
+    anew: bool = False,
+    threads: _Int = 0,
+) -> list[tuple[int, ...]]:
+    """The same from poses: joints float32[J, 9], blend_shapes float32[C] of each."""
+
 class Skins:
     """See risorius.Surface."""
 

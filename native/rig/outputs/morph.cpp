@@ -21,13 +21,18 @@ void evaluate_morph(const Morph& morph, const float* weights, const float* base,
   for (std::size_t c = 0; c < morph.channels.size(); ++c) {
     const float w = weights[morph.channels[c]];
     if (w == 0.0f) continue;
-    for (std::uint32_t i = morph.channel_offsets[c]; i < morph.channel_offsets[c + 1]; ++i) {
-      const Morph::Delta& d = morph.deltas[i];
-      float* v = out + std::size_t{d.vertex} * 3;
-      v[0] += w * d.x;
-      v[1] += w * d.y;
-      v[2] += w * d.z;
-    }
+    const std::uint32_t begin = morph.channel_offsets[c];
+    add_deltas(morph.deltas.data() + begin, morph.channel_offsets[c + 1] - begin, w, 0, out);
+  }
+}
+
+void add_deltas(const Morph::Delta* deltas, std::size_t n, float weight, std::uint32_t first,
+                float* values) noexcept {
+  for (const Morph::Delta* d = deltas; d < deltas + n; ++d) {
+    float* v = values + std::size_t{d->vertex - first} * 3;
+    v[0] += weight * d->x;
+    v[1] += weight * d->y;
+    v[2] += weight * d->z;
   }
 }
 

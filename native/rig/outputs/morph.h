@@ -2,6 +2,7 @@
 // Morph: the blend shape targets of one mesh, compiled for summing.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -26,5 +27,10 @@ struct Morph {
 /// Out: out     float32[vertices, 3], may not overlap base
 void evaluate_morph(const Morph& morph, const float* weights, const float* base,
                     float* out) noexcept;
+
+/// values[vertex - first] += weight * delta, of n deltas.
+/// In: first   vertex of values, float32[.., 3]
+void add_deltas(const Morph::Delta* deltas, std::size_t n, float weight, std::uint32_t first,
+                float* values) noexcept;
 
 }  // namespace risorius::rig

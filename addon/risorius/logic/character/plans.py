@@ -18,10 +18,6 @@ from . import slider_words
 from .dna_data import DnaData, MeshData
 
 LIVE_KEY = "<channel sum>"
-# Keys x vertices of a mesh, above which real keys cost too much: time in every frame from two
-# million on, and before that 12 bytes each in every .blend and for every face of the same file.
-AUTO_LIMIT = 500_000
-AUTO_KEYS = 200  # real keys of a character: each driver costs Blender some 3 us a frame
 _LAYER_WORDS = {
     "mlbh": told("neural network behaviour"),
     "mlbe": told("neural network behaviour"),

@@ -20,9 +20,10 @@ from ...logic.base.sentences import told
 from ..animation import actions
 from ..base import last_written, parts, saved
 from ..base.blender_types import Animated, ArmatureObject, Context, MeshObject
-from ..character import runtime
+from ..character import runtime, values
 from ..frame import channel_preview, controls_ahead, evaluate
 from ..lod import lods
+from ..skinning import ordinary
 from . import baked_shape_keys, baked_tracks, sampling
 
 RESULT, CONTROLS = "RESULT", "CONTROLS"
@@ -210,6 +211,8 @@ def _write_result(
     rig: ArmatureObject, samples: sampling.Samples, level: int, options: BakeOptions
 ) -> str:
     live, counts = runtime.there(rig), actions.Counts()
+    ordinary.leave(rig)
+    values.point_materials(rig, rig)
     pose = baked_tracks.evaluate(live, samples, level)
     name = rig.name.removesuffix("_rig")
     state = {
@@ -320,6 +323,7 @@ def _take_back(rig: ArmatureObject, kind: str) -> None:
 
 
 def _restore_animation(rig: ArmatureObject) -> None:
+    values.point_materials(rig, parts.carrier_of(rig))
     actions.restore(rig)
     for item in parts.meshes_of(rig):
         if item.data.shape_keys is not None:

@@ -17,7 +17,8 @@ from ..animation.actions import Track
 from ..base import drivers, parts
 from ..base.blender_types import ArmatureObject
 from ..character import armatures, runtime
-from ..frame import bone_writer, joint_readings
+from ..frame import joint_readings
+from ..skinning import bone_writer
 from . import sampling
 
 _WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}

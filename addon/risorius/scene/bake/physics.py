@@ -10,7 +10,8 @@ import bpy
 from ...logic.base.sentences import Sentence, told
 from ..base import console, parts
 from ..base.blender_types import ArmatureObject, Context
-from ..frame import caches, controls_ahead, lateness
+from ..frame import controls_ahead, lateness
+from ..skinning import caches
 from .bake_face import BakeError
 
 

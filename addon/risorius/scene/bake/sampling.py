@@ -22,7 +22,8 @@ from ..animation import layer_mixing, layers
 from ..base import compat, drivers, parts
 from ..base.blender_types import ArmatureObject, Context, Depsgraph, MeshObject
 from ..character import rig_placement, runtime
-from ..frame import bone_writer, evaluate, inputs, joint_readings
+from ..frame import evaluate, inputs, joint_readings
+from ..skinning import bone_writer
 
 _CHANNELS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "scale": 3}
 _BONES = ("neck", "head", "eyes", "eye_L", "eye_R")

@@ -61,10 +61,12 @@ class Entries:
     def __init__(
         self, rig: ArmatureObject, labels: Mapping[str, tuple[Sequence[str], Sequence[str]]]
     ) -> None:
-        self._rig = rig
         self._moves: list[tuple[bpy.types.DriverTarget, str]] = []
         self.gone: list[str] = []
-        for _owner, target in targets_at(rig):
+        carrier = parts.carrier_of(rig)
+        there = [target for _owner, target in targets_at(rig)]
+        there += [target for _owner, target in targets_at(carrier) if carrier != rig]
+        for target in there:
             found = self._label(target.data_path, labels)
             if found is None:
                 continue
@@ -72,7 +74,7 @@ class Entries:
             if label in labels[array][1]:
                 path = f'["{array}"][{labels[array][1].index(label)}]'
             else:
-                path = self._stand_in(array, label)
+                path = self._stand_in(target, array, label)
             if path != target.data_path:
                 self._moves.append((target, path))
 
@@ -88,10 +90,11 @@ class Entries:
             return (array, back) if back is not None else None
         return None
 
-    def _stand_in(self, array: str, label: str) -> str:
+    def _stand_in(self, target: bpy.types.DriverTarget, array: str, label: str) -> str:
         """A property of value 0 in place of what is gone, so that drivers stay valid."""
         key = _gone_key(array, label)
-        self._rig[key] = 0.0
+        assert target.id is not None
+        target.id[key] = 0.0
         if label not in self.gone:
             self.gone.append(label)
         return f'["{bpy.utils.escape_identifier(key)}"]'
@@ -137,13 +140,13 @@ def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
 
 
 def plain_driver(
-    curve: bpy.types.FCurve, rig: ArmatureObject, data_path: str, name: str = "var"
+    curve: bpy.types.FCurve, owner: bpy.types.Object, data_path: str, name: str = "var"
 ) -> None:
-    """Make an F-curve follow one property of the rig, without any expression.
+    """Make an F-curve follow one property of an object, without any expression.
 
     Args:
         curve: of a new driver that has no variables.
-        rig: the object that has the property.
+        owner: the object that has the property.
         data_path: from the object to one number.
         name: of the driver's variable.
     """
@@ -154,5 +157,5 @@ def plain_driver(
     variable.name = name
     variable.type = "SINGLE_PROP"
     variable.targets[0].id_type = "OBJECT"
-    variable.targets[0].id = rig
+    variable.targets[0].id = owner
     variable.targets[0].data_path = data_path

@@ -6,7 +6,7 @@ from __future__ import annotations
 from .blender_types import ArmatureObject
 
 VERSION = "risorius_version"  # on the control armature: the number of its form
-PRESENT = 3
+PRESENT = 4
 NEEDS = "Needs Risorius"  # on the same: words for those who open the file without the add-on
 WORDS = (
     "Its sliders and bones move the face by this add-on; without it the face keeps its last pose"

@@ -33,6 +33,10 @@ LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: its number in the DNA
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
+FINISHED = "risorius_finished"  # on a mesh object: it is in Direct mode now, see direct.py
+SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" where Direct is not wanted
+JOINTS_SHOWN = "risorius_joints_shown"  # on the same: its joints were shown in an older file
+VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
 NAMES = "risorius_names"  # on a Mesh: what the user says of its shape keys, see assigned.py
 REAL = "risorius_real"  # on a Key: channels that are real keys although the mesh is LIVE
 KEY_NAMES = "risorius_key_names"  # on a Key in LIVE mode: names that the user gave to our keys
@@ -108,6 +112,19 @@ def keys_there(item: MeshObject) -> bpy.types.Key:
     key = item.data.shape_keys
     assert key is not None
     return key
+
+
+def carrier_of(rig: ArmatureObject) -> bpy.types.Object:
+    """The object whose array MAPS the drivers of a character's materials read.
+
+    It is a mesh of the character: each update of the deforming armature copies all its bones.
+    Characters of older files have the array on the deforming armature alone.
+
+    Args:
+        rig: deforming armature.
+    """
+    found = saved.item(rig, VALUES)
+    return rig if found is None or found.get(RIG) != rig or MAPS not in found else found
 
 
 def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:

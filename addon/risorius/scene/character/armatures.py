@@ -246,6 +246,18 @@ def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
             driver.variables.remove(variable)
 
 
+def joints_are_shown(rig: ArmatureObject) -> bool:
+    """Whether bones of a deforming armature can be seen: their collection is shown."""
+    return not rig.hide_viewport and any(c.is_visible for c in rig.data.collections_all)
+
+
+def hide_joints(rig: ArmatureObject) -> None:
+    """Hide the bones of a deforming armature; their names and selection stay."""
+    for shelf in rig.data.collections_all:
+        shelf.is_visible = False
+    rig.pop(parts.JOINTS_SHOWN, None)
+
+
 def lock_place(item: bpy.types.Object) -> None:
     """Let the user's hand not move an object by accident."""
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)

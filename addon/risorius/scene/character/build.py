@@ -17,7 +17,7 @@ from ..base import compat, form, last_written, parts, sharing, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..lod import lods
 from ..material import materials
-from . import armatures, meshes, runtime
+from . import armatures, meshes, runtime, values
 
 
 @dataclass(frozen=True)
@@ -140,6 +140,7 @@ def _build(
         parts.point(rig, f"{parts.MESH_PREFIX}{number:03d}", item)
         built.append(item)
         progress(0.4 + 0.3 * (number + 1) / len(plan.meshes))
+    values.carry_on_largest(rig)
     warnings = []
     # Drivers are made only after the properties that they read have reached the evaluated
     # copies: one that was evaluated before stays invalid for ever.
@@ -228,13 +229,27 @@ def _add_shapes(
     mode: str,
 ) -> None:
     labels = channel_labels(dna)
-    total = sum(len(m.channels) for m in plan.meshes)
     for item, mesh_plan in zip(built, plan.meshes, strict=True):
-        count = len(mesh_plan.channels)
-        chosen = mode
-        if mode == "AUTO":
-            chosen = meshes.automatic_mode(count, len(mesh_plan.positions), total)
-        meshes.set_mode(item, rig, dna.meshes[mesh_plan.index], plan.space, labels, chosen)
+        dna_mesh = dna.meshes[mesh_plan.index]
+        meshes.set_mode(item, rig, dna_mesh, plan.space, labels, _kind_of_keys(mode))
+    choose_skinning(rig, mode)
+
+
+def _kind_of_keys(mode: str) -> str:
+    return "KEYS" if mode == "KEYS" else "LIVE"
+
+
+def choose_skinning(rig: ArmatureObject, mode: str) -> None:
+    """Note whether a face may be in Direct mode.
+
+    Args:
+        rig: its deforming armature.
+        mode: AUTO, LIVE or KEYS.
+    """
+    if mode == "LIVE":
+        rig[parts.SKINNING] = mode
+    else:
+        rig.pop(parts.SKINNING, None)
 
 
 def channel_labels(dna: native.Dna) -> list[str]:
@@ -261,8 +276,8 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
     Args:
         rig: its deforming armature.
-        mode: "LIVE" for one key that the add-on sums, "KEYS" for one key a channel, or "AUTO",
-            which chooses for each mesh by its size.
+        mode: "AUTO" for finished positions in one key of each mesh, "LIVE" for one key that is
+            summed below the armature, "KEYS" for one key a channel.
 
     Returns:
         Sentences on meshes that could not be switched.
@@ -271,18 +286,13 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
     trouble = []
     items = parts.meshes_of(rig)
     found = [(i, m) for i in items if (m := runtime.dna_mesh(live, i)) is not None]
-    total = sum(len(dna_mesh.blend_shape_targets) for _item, dna_mesh in found)
     for item, dna_mesh in found:
-        chosen = mode
-        if mode == "AUTO":
-            chosen = meshes.automatic_mode(
-                len(dna_mesh.blend_shape_targets), len(dna_mesh.positions), total
-            )
         labels = channel_labels(live.dna)
-        if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, chosen):
+        if not meshes.set_mode(item, rig, dna_mesh, live.space, labels, _kind_of_keys(mode)):
             trouble.append(
                 f"{item.name} has not as many vertices as in its file: its shapes stay as they are."
             )
+    choose_skinning(rig, mode)
     last_written.forget()
     return trouble
 

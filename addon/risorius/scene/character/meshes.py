@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ... import native
 from ...logic.base.space import Space
 from ...logic.character import plans, user_edits
-from ...logic.character.plans import AUTO_KEYS, AUTO_LIMIT, LIVE_KEY
-from ..base import compat, drivers, parts, saved
+from ...logic.character.plans import LIVE_KEY
+from ..base import compat, drivers, parts, saved, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from .armatures import lock_place
 
@@ -25,6 +25,20 @@ _KEY_VALUE = re.compile(r'^key_blocks\["(.*)"\]\.value$')
 _LIVE_MARK = "KEY_BSPLINE"
 
 Deltas = tuple[NDArray[np.int64], NDArray[np.float32]]  # vertex indices, [K, 3]
+
+
+# Mesh objects that were built and not edited since: they have the skin weights of their file.
+_fresh: set[int] = session.keep("meshes.fresh", set, ("undo", "load"))
+
+
+def fresh_weights(item: MeshObject) -> bool:
+    """Whether a mesh was built a moment ago, and has the skin weights of its file."""
+    return item.session_uid in _fresh
+
+
+def note_edit(uid: int) -> None:
+    """A mesh was edited. Args: uid  the session uid of its object."""
+    _fresh.discard(uid)
 
 
 def build_mesh(
@@ -74,6 +88,7 @@ def build_mesh(
     item[parts.LODS] = list(mesh_plan.lods)
     item[parts.MODE] = "KEYS"
     item.property_overridable_library_set(f'["{parts.MODE}"]', True)
+    _fresh.add(item.session_uid)
     return item
 
 
@@ -96,17 +111,6 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
         edit.to_mesh(item.data)
     finally:
         edit.free()
-
-
-def automatic_mode(target_count: int, vertex_count: int, all_targets: int) -> str:
-    """KEYS where real keys are cheap enough each frame, else LIVE.
-
-    Args:
-        target_count, vertex_count: of the mesh.
-        all_targets: of all meshes of the character.
-    """
-    few = target_count * vertex_count < AUTO_LIMIT and all_targets <= AUTO_KEYS
-    return "KEYS" if few else "LIVE"
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
@@ -346,14 +350,21 @@ def _to_live(
     elif parts.REAL in key:
         del key[parts.REAL]
     if live_block(item) is None:
-        block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
-        block.value = 1.0
-        block.interpolation = _LIVE_MARK
-        # What is edited in it is lost at the next change of a control: nobody shall get there
-        # by entering edit mode.
-        block.lock_shape = True
-        if item.active_shape_key == block:
-            item.active_shape_key_index = 0
+        add_live_key(item)
+
+
+def add_live_key(item: MeshObject) -> None:
+    """Add the key that bears the channel sum, or finished positions. Args: item  the mesh."""
+    if item.data.shape_keys is None:
+        item.shape_key_add(name="Basis", from_mix=False)
+    block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
+    block.value = 1.0
+    block.interpolation = _LIVE_MARK
+    # Edits in it are lost at the next change of a control: nobody shall get there by entering
+    # edit mode.
+    block.lock_shape = True
+    item.active_shape_key_index = 0
+    item[parts.MODE] = "LIVE"
 
 
 def touched(

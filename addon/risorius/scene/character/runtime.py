@@ -72,6 +72,10 @@ class Runtime:
         """Meshes of the file; `dna.meshes` makes an object of each at every look."""
         return len(self.dna.meshes)
 
+    def vertex_count(self, mesh_index: int) -> int:
+        """Vertices of a mesh of the file."""
+        return self.morph(mesh_index).vertex_count
+
     def chain(self, joint: int) -> Chain:
         """The joints from the root to one, read when first asked for."""
         if joint not in self.chains:

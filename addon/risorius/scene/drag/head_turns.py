@@ -10,16 +10,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from mathutils import Matrix, Quaternion
+from mathutils import Matrix, Quaternion, Vector
 from numpy.typing import NDArray
 
 from ..base import parts, saved
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import runtime
+from ..skinning import conditions, direct
 
 Float = NDArray[np.float64]
 
 _STRAIGHT = np.eye(4)
+_LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
 
 
 class HeadTurns:
@@ -45,6 +47,11 @@ class HeadTurns:
         """
         seen = rig.evaluated_get(depsgraph)
         self._live, self._bones, self._rests = live, seen.pose.bones, rig.data.bones
+        plan = conditions.known(rig)
+        frame = direct.shown(rig) if plan is not None and not plan.posed else None
+        self._places = frame.bones.names if frame is not None else {}
+        self._posed = frame.matrices() if frame is not None else None
+        self._channels = frame.bone_channels() if frame is not None else {}
         numbers = ((saved.whole(b, parts.JOINT, -1), b.name) for b in rig.data.bones)
         self._names = {joint: name for joint, name in numbers if joint >= 0}
         self._place = np.array(seen.matrix_world)
@@ -118,15 +125,22 @@ class HeadTurns:
             return above
         carrier = Matrix() if parent == joint else self._skin(parent)
         if joint in self._parts:
-            pivot = self._rests[name].matrix_local @ self._bones[name].location
+            pivot = self._rests[name].matrix_local @ self._location(name)
             about = Matrix.Translation(pivot) @ self._parts[joint] @ Matrix.Translation(-pivot)
             return np.array(carrier @ about @ carrier.inverted_safe()) @ above
         return np.array(self._skin(joint) @ carrier.inverted_safe()) @ above
+
+    def _location(self, name: str) -> Vector:
+        if self._posed is None:
+            return self._bones[name].location
+        return Vector(self._channels["location"][self._places[name]].tolist())
 
     def _skin(self, joint: int) -> Matrix:
         name = self._names.get(joint)
         if name is None:
             return Matrix()
+        if self._posed is not None:  # natively, in Direct mode
+            return Matrix([*self._posed[self._places[name]].tolist(), _LAST])
         return self._bones[name].matrix @ self._rests[name].matrix_local.inverted_safe()
 
 

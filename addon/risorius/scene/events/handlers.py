@@ -17,7 +17,6 @@ from ..base import compat, console, last_written, parts, session, sharing
 from ..base.blender_types import ArmatureObject, Depsgraph, current_context
 from ..character import board, outlines, rig_placement, runtime, shown_keys
 from ..frame import (
-    caches,
     channel_preview,
     controls_ahead,
     evaluate,
@@ -28,6 +27,7 @@ from ..frame import (
 )
 from ..lod import lods
 from ..see_why import heat
+from ..skinning import caches, conditions, ordinary, skins
 from ..upkeep import applied_transforms, bone_edits, duplicates, migrations, repair
 
 
@@ -69,6 +69,7 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
     if depsgraph is not None:
         timing.evaluated()
         evaluate.after_frame(depsgraph)
+    conditions.end_frame()
 
 
 def _is_rendered() -> bool:
@@ -80,6 +81,8 @@ def _is_rendered() -> bool:
 
 @persistent
 def _render_begins(*_arguments: object) -> None:
+    conditions.look_quickly()
+    refresh(evaluate.Moment.ANEW)  # modes do not change while it runs
     _work.rendering = True
 
 
@@ -110,19 +113,26 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
         return
     _work.busy = True
     try:
+        known = _objects.now
         _notice_copies(depsgraph.updates)
         # A change of a colour space is among the updates, one of pixels is not.
         console.say(*sharing.separate(spaces=depsgraph.id_type_updated("IMAGE")))
+        skins.forget(conditions.note_updates(depsgraph) & known)
         waiting = set(_mended)
         _mended.clear()
         edited = _edited(depsgraph)
-        edited += [rig for rig in parts.rigs() if rig.session_uid in waiting and rig not in edited]
+        edited += [
+            rig
+            for rig in parts.rigs()
+            if rig not in edited and (rig.session_uid in waiting or conditions.stale(rig))
+        ]
         if edited:
             timing.begin()
-        for rig in edited:
-            if _mend(rig):
-                continue  # the evaluated copy knows of it only after the next update
-            evaluate.evaluate(rig, depsgraph)
+        with evaluate.together():
+            for rig in edited:
+                if _mend(rig):
+                    continue  # the evaluated copy knows of it only after the next update
+                evaluate.evaluate(rig, depsgraph)
     finally:
         _work.busy = False
 
@@ -194,7 +204,7 @@ def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
                 armatures.add(item)
             camera_moved |= camera is not None and item == camera.original
     if bones_edited:
-        last_written.forget()
+        last_written.forget()  # the rest pose of the bones with it
         for rig in repair.heal_all():
             _note_mended(rig)
     layer_mixing.note_edits(actions)
@@ -254,7 +264,7 @@ def _loaded(*_arguments: object) -> None:
         last_written.forget()
         look_masks.take_away()  # of a file that Blender saved by itself, before a crash
         heat.end_all()
-        refresh()
+        refresh(evaluate.Moment.LOAD)
     _restored()
 
 
@@ -294,6 +304,7 @@ def _before_save(*_arguments: object) -> None:
         refresh()
     repair.remove_dead()
     console.say(*sharing.share())
+    ordinary.take_on(parts.rigs())
 
 
 @persistent
@@ -301,6 +312,7 @@ def _saved(*_arguments: object) -> None:
     """What no file shall have, the session has again."""
     if native.problem():
         return
+    ordinary.take_off(parts.rigs())
     if look_masks.give_back():
         refresh()
     layer = current_context().view_layer
@@ -314,14 +326,18 @@ def _end_tests(*_arguments: object) -> None:
         refresh()
 
 
-def refresh() -> None:
-    """Bring all characters up to their controls now, each in the scenes that it is in."""
+def refresh(moment: evaluate.Moment = evaluate.Moment.UPDATE) -> None:
+    """Bring all characters up to their controls now, each in the scenes that it is in.
+
+    Args:
+        moment: Moment.
+    """
     if native.problem() or not parts.rigs():
         return
     for scene in bpy.data.scenes:
         for layer in scene.view_layers:
             if layer.depsgraph is not None:
-                evaluate.evaluate_all(cast("Depsgraph", layer.depsgraph))
+                evaluate.evaluate_all(cast("Depsgraph", layer.depsgraph), moment)
 
 
 _HANDLERS = (
@@ -363,6 +379,8 @@ def unregister() -> None:
     heat.end_all()
     if look_masks.take_away():
         refresh()
+    for rig in parts.rigs():
+        ordinary.leave(rig)
     for name, handler in reversed(_there()):
         present = getattr(bpy.app.handlers, name)
         if handler in present:

@@ -182,6 +182,8 @@ def _copy_mesh(
     for modifier in made.modifiers:
         if modifier.type == "ARMATURE":
             cast("bpy.types.ArmatureModifier", modifier).object = rig_copy
+            if parts.FINISHED in item:
+                modifier.show_viewport = modifier.show_render = True
     stage.collection.objects.link(made)
     _show(made)
     return made

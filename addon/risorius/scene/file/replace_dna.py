@@ -20,9 +20,10 @@ from ...logic.base.sentences import told
 from ...logic.character import plans
 from ..base import console, drivers, last_written, parts, saved, storage
 from ..base.blender_types import ArmatureObject, Context, MeshObject
-from ..character import armatures, board, board_bones, build, runtime
+from ..character import armatures, board, board_bones, build, runtime, values
 from ..gaze import gaze_settings
 from ..lod import lods
+from ..skinning import ordinary
 from ..upkeep import duplicates
 from . import refit_joints, refit_meshes
 from .file_change import Change
@@ -103,14 +104,17 @@ def _options(rig: ArmatureObject, levels: tuple[int, ...], unit: float) -> build
 def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
     """Move everything of the new character into the old one, and take the rest away."""
     rig = change.rig
+    ordinary.leave(rig)
     refit_joints.replace_joints(context, change)
     fresh_meshes = {m[parts.MESH]: m for m in parts.meshes_of(fresh)}
     kept = refit_meshes.replace_meshes(change, fresh_meshes)
     _take_properties(change, fresh)
+    values.carry_on_largest(rig)
     _sliders(change)
     entries = drivers.Entries(rig, _array_labels(change))
-    build.settle(context, rig, parts.controls_there(rig))
+    build.settle(context, rig, parts.controls_there(rig), parts.carrier_of(rig))
     entries.move()
+    values.point_materials(rig, parts.carrier_of(rig))
     _report_entries(change, entries)
     for index in [i for i in fresh_meshes if i not in kept]:
         _adopt(change, fresh, fresh_meshes[index])

@@ -20,7 +20,8 @@ from ...logic.base.sentences import told
 from ..base import parts, session, stage
 from ..base.blender_types import ArmatureObject, Depsgraph
 from ..character import rig_placement
-from . import caches, lateness
+from ..skinning import caches
+from . import lateness
 
 Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control armature
 

@@ -12,31 +12,29 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
 from time import perf_counter
+from typing import cast
 
 import bpy
 import numpy as np
 
 from ... import native
 from ..animation import layers
-from ..base import drivers, last_written, parts, saved, session
+from ..base import drivers, last_written, parts, session
 from ..base.blender_types import ArmatureObject, Context, Depsgraph
-from ..character import rig_placement, runtime
+from ..character import rig_placement, runtime, values
 from ..lod import lods
-from . import (
-    bone_writer,
-    channel_preview,
-    controls_ahead,
-    inputs,
-    joint_readings,
-    lateness,
-    live_keys,
-    look_masks,
-    timing,
-)
+from ..skinning import bone_writer, conditions, direct, live_keys
+from . import channel_preview, controls_ahead, inputs, joint_readings, lateness, look_masks, timing
 
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
 # Deforming armature -> what was done before this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
+# Finished positions of several faces that are written together; None: at once.
+_gathered = session.value(
+    "evaluate.gathered", cast("list[direct.Job] | None", None), ("unregister",)
+)
+# Deforming armature -> what the controls of a face asked for when its file was opened.
+_opened: dict[int, tuple[object, ...]] = session.table("evaluate.opened", ("load",))
 
 
 class Moment(Enum):
@@ -44,12 +42,14 @@ class Moment(Enum):
 
     UPDATE: after Blender evaluated what is read. ANEW: then, too, and what seems unchanged is
     written as well. FRAME: before Blender evaluates a frame. RENDER: before one that is rendered.
+    LOAD: after a file was opened, whose faces stay as they were saved until they move.
     """
 
     UPDATE = auto()
     ANEW = auto()
     FRAME = auto()
     RENDER = auto()
+    LOAD = auto()
 
 
 _BEFORE_FRAME = frozenset((Moment.FRAME, Moment.RENDER))
@@ -84,16 +84,18 @@ def is_paused() -> bool:
     return _pauses.now > 0
 
 
-def evaluate_all(depsgraph: Depsgraph) -> None:
+def evaluate_all(depsgraph: Depsgraph, moment: Moment = Moment.UPDATE) -> None:
     """Bring every character of this file up to its controls.
 
     Args:
         depsgraph: the evaluated dependency graph to read from.
+        moment: Moment.
     """
     if native.problem() or is_paused():
         return
-    for rig in parts.rigs():
-        evaluate(rig, depsgraph)
+    with together():
+        for rig in parts.rigs():
+            evaluate(rig, depsgraph, moment)
 
 
 def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
@@ -118,11 +120,12 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     timing.animated()
     if depsgraph is None:
         return
-    for rig, controls in faces:
-        seen = controls.evaluated_get(depsgraph)
-        glance = _glance(seen) if _is_simple(rig, seen) else None
-        wrote = evaluate(rig, depsgraph, Moment.RENDER if rendering else Moment.FRAME)
-        _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
+    with together():
+        for rig, controls in faces:
+            seen = controls.evaluated_get(depsgraph)
+            glance = _glance(seen) if _is_simple(rig, seen) else None
+            wrote = evaluate(rig, depsgraph, Moment.RENDER if rendering else Moment.FRAME)
+            _ahead[rig.session_uid] = _Ahead(glance, wrote, rendering)
 
 
 def _look_at_joints(edited: bool) -> bool:
@@ -131,7 +134,10 @@ def _look_at_joints(edited: bool) -> bool:
     for rig in parts.rigs():
         live = runtime.of(rig) if parts.BAKED not in rig else None
         if live is not None:
-            found |= bool(joint_readings.look(rig, live, edited).places)
+            reading = joint_readings.look(rig, live, edited)
+            found |= bool(reading.places)
+            if drivers.moves(rig) or any(reading.wiring):
+                conditions.note_moved(rig)
     return found
 
 
@@ -143,18 +149,19 @@ def after_frame(depsgraph: Depsgraph) -> None:
     """
     if native.problem() or is_paused():
         return
-    for rig in parts.rigs():
-        done = _ahead.pop(rig.session_uid, None)
-        again = done is not None and done.wrote and drivers.moves(rig)
-        if done is not None and not again and _is_as_before(rig, done, depsgraph):
-            continue
-        was = last_written.inputs.get(rig.session_uid)
-        if again:
-            # Other animation of its bones came over ours.
-            last_written.inputs.pop(rig.session_uid, None)
-        if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
-            now = last_written.inputs.get(rig.session_uid)
-            lateness.count(rig, was, now, runtime.there(rig).labels)
+    with together():
+        for rig in parts.rigs():
+            done = _ahead.pop(rig.session_uid, None)
+            again = done is not None and done.wrote and drivers.moves(rig)
+            if done is not None and not again and _is_as_before(rig, done, depsgraph):
+                continue
+            was = last_written.inputs.get(rig.session_uid)
+            if again:
+                # Other animation of its bones came over ours.
+                last_written.inputs.pop(rig.session_uid, None)
+            if evaluate(rig, depsgraph) and (done is not None or lateness.circle(rig)):
+                now = last_written.inputs.get(rig.session_uid)
+                lateness.count(rig, was, now, runtime.there(rig).labels)
     live_keys.reach(depsgraph)
 
 
@@ -215,8 +222,11 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     test = channel_preview.override(rig, raw, depsgraph.scene)
     rendering = moment is Moment.RENDER or depsgraph.mode == "RENDER"
     look = look_masks.for_frame(rig, rendering)
-    state = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
-    anew = moment is Moment.ANEW
+    asked = (raw.tobytes(), lod, (test, look), *((name, *turn) for name, turn in turns.items()))
+    plan = _plan(rig, live, asked, moment, rendering)
+    changed = not rendering and direct.settle(rig, plan)
+    state = (*asked, plan)
+    anew = moment is Moment.ANEW or changed
     if not last_written.is_new(last_written.inputs, rig, state) and not anew:
         timing.looked(times[0])
         return False
@@ -225,20 +235,74 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     look_masks.apply(look, pose, live, lod)
     channel_preview.apply(test, pose.blend_shapes)
     times.append(perf_counter())
-    keyed = joint_readings.of(rig, live).keyed
-    taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
-    last_written.note_refusal(rig, taken)
-    if not taken:
-        return False  # channels and maps shall not move without the bones
-    _write_values(rig, pose)
+    if plan.posed:
+        keyed = joint_readings.of(rig, live).keyed
+        taken = bone_writer.write(rig, live, pose.joints, turns, depsgraph, keyed)
+        last_written.note_refusal(rig, taken)
+        if not taken:
+            return False  # channels and maps shall not move without the bones
+        rig.update_tag(refresh={"OBJECT"})
+    values.write(rig, pose.animated_maps, pose.blend_shapes, live_keys.bears_simulation)
     times.append(perf_counter())
+    finished = []
     for item in parts.meshes_of(rig):
-        if lods.shows(item, lod):
+        if not lods.shows(item, lod):
+            continue
+        if item.session_uid in plan.direct:
+            finished.append(item)
+        else:
             live_keys.write(item, live, pose.blend_shapes, anew, moment in _BEFORE_FRAME)
-    rig.update_tag(refresh={"OBJECT"})
+    if finished:
+        shape = direct.Shape(pose.joints, pose.blend_shapes, turns)
+        _write_finished(direct.prepare(rig, live, shape, finished, anew))
     times.append(perf_counter())
     timing.add(times)
     return True
+
+
+def _write_finished(job: direct.Job) -> None:
+    """Write finished positions now, or with those of the other faces: all cores do it together."""
+    if _gathered.now is None:
+        direct.write([job])
+    else:
+        _gathered.now.append(job)
+
+
+@contextmanager
+def together() -> Iterator[None]:
+    """While this lasts finished positions are gathered; at its end all are written at once."""
+    if _gathered.now is not None:
+        yield
+        return
+    _gathered.now = []
+    try:
+        yield
+        jobs = _gathered.now
+    finally:
+        _gathered.now = None
+    if jobs:
+        begin = perf_counter()
+        direct.write(jobs)
+        timing.skinned(begin)
+
+
+def _plan(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    asked: tuple[object, ...],
+    moment: Moment,
+    rendering: bool,
+) -> conditions.Plan:
+    """How a face is shown now. Args: see evaluate; asked  what its controls ask for."""
+    if rendering:  # modes do not change in a render: Blender would build its graph anew
+        return conditions.known(rig) or conditions.ORDINARY
+    if moment is Moment.LOAD:
+        _opened[rig.session_uid] = asked
+    # The skin weights of a face are read when it moves, so that a file opens as fast as before.
+    if _opened.get(rig.session_uid) == asked and moment is not Moment.ANEW:
+        return conditions.ORDINARY
+    _opened.pop(rig.session_uid, None)
+    return conditions.of(rig, live)
 
 
 def _lod(rig: ArmatureObject, seen: ArmatureObject, depsgraph: Depsgraph, moment: Moment) -> int:
@@ -270,10 +334,3 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
     """Objects of a character, an override, that Blender lets nobody write to."""
     return [item for item in (rig, *parts.meshes_of(rig)) if last_written.is_refused(item)]
-
-
-def _write_values(rig: ArmatureObject, pose: native.Pose) -> None:
-    """Write channels and maps to the array properties that drivers read."""
-    for name, values in ((parts.MAPS, pose.animated_maps), (parts.CHANNELS, pose.blend_shapes)):
-        if len(values) and saved.length(rig, name) == len(values):
-            rig[name][:] = values.tolist()

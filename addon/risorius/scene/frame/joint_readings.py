@@ -13,7 +13,8 @@ import bpy
 from ..base import compat, console, drivers, last_written, parts
 from ..base.blender_types import ArmatureObject
 from ..character import runtime
-from . import bone_writer, joint_circles
+from ..skinning import bone_writer
+from . import joint_circles
 
 
 @dataclass

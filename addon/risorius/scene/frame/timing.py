@@ -66,6 +66,12 @@ def add(times: Sequence[float]) -> None:
     frames[-1].ended = times[-1]
 
 
+def skinned(begin: float) -> None:
+    """Finished positions of all faces were written. Args: begin  perf_counter then."""
+    frames[-1].stages["shapes"] += _since(begin)
+    frames[-1].ended = perf_counter()
+
+
 def drawing_begins() -> None:
     """Blender has evaluated what was written, and begins to draw a view."""
     _drawing.now = perf_counter()

@@ -155,7 +155,9 @@ class Skin:
         value.parent = frame
         path = f'nodes["{value.name}"].outputs[0].default_value'
         driver = self.graph.tree.driver_add(path)
-        drivers.plain_driver(driver, self.look.rig, f'["{parts.MAPS}"][{use.index}]')
+        drivers.plain_driver(
+            driver, parts.carrier_of(self.look.rig), f'["{parts.MAPS}"][{use.index}]'
+        )
         return value.outputs[0]
 
     def _masked(self, bucket: Bucket, mask: Mask, members: Sequence[Member]) -> Socket:

@@ -12,6 +12,7 @@ from ..base import compat, last_written, parts
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import armatures, meshes
 from ..material import materials
+from ..skinning import ordinary
 
 
 def separate_all() -> list[str]:
@@ -44,6 +45,9 @@ def separate(rig: ArmatureObject) -> list[str]:
     if controls is not None and parts.PULL in rig and not rig.override_library:
         armatures.pull_controls(rig, controls)
     copied = {}
+    strays = [m for m in parts.meshes_pointing_at(rig) if m not in parts.meshes_of(rig)]
+    if any(parts.FINISHED in item for item in strays):
+        ordinary.leave(rig)  # nothing writes positions to a mesh that the character does not list
     for item in parts.meshes_pointing_at(rig):
         done += _own_mesh(item)
         _own_key_drivers(item, rig)
@@ -68,13 +72,13 @@ def _own_mesh(item: MeshObject) -> list[str]:
     return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]
 
 
-def _retarget(curves: Iterable[bpy.types.FCurve], rig: ArmatureObject) -> bool:
+def _retarget(curves: Iterable[bpy.types.FCurve], owner: bpy.types.Object) -> bool:
     changed = False
     for curve in curves:
         for variable in compat.driver_of(curve).variables:
             for target in variable.targets:
-                if target.id != rig and variable.type == "SINGLE_PROP":
-                    target.id = rig
+                if target.id != owner and variable.type == "SINGLE_PROP":
+                    target.id = owner
                     changed = True
     return changed
 
@@ -94,23 +98,27 @@ def retarget_materials(item: MeshObject, rig: ArmatureObject) -> None:
 
     Args:
         item: the mesh object.
-        rig: deforming armature that the drivers of the maps read from now on.
+        rig: deforming armature of the character whose maps drivers read from now on.
     """
     for slot in item.material_slots:
         if slot.material is not None:
-            _retarget(materials.map_drivers(slot.material), rig)
+            _retarget(materials.map_drivers(slot.material), parts.carrier_of(rig))
 
 
 def _own_materials(
     item: MeshObject, rig: ArmatureObject, copied: dict[str, bpy.types.Material]
 ) -> None:
+    carrier = parts.carrier_of(rig)
     for slot in item.material_slots:
         material = slot.material
         if material is None:
             continue
         curves = list(materials.map_drivers(material))
         foreign = any(
-            t.id != rig for c in curves for v in compat.driver_of(c).variables for t in v.targets
+            t.id != carrier
+            for c in curves
+            for v in compat.driver_of(c).variables
+            for t in v.targets
         )
         if not foreign or not curves:
             continue
@@ -118,6 +126,6 @@ def _own_materials(
         if material.name not in copied:
             copied[material.name] = material.copy() if material.users > 1 else material
         own = copied[material.name]
-        _retarget(materials.map_drivers(own), rig)
+        _retarget(materials.map_drivers(own), carrier)
         slot.material = own
         copied[own.name] = own

@@ -10,7 +10,9 @@ from __future__ import annotations
 from ..animation import actions
 from ..base import form, parts, session
 from ..base.blender_types import ArmatureObject
-from ..frame import caches, joint_turns
+from ..character import armatures, values
+from ..frame import joint_turns
+from ..skinning import caches
 
 # Session uids of characters that something was said of.
 _said: set[int] = session.keep("migrations.said", set, ("load",))
@@ -105,4 +107,16 @@ def _to_3(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     return ["the sliders of its joints' rotations go on leading the neck poses"]
 
 
-_STEPS = (_to_1, _to_2, _to_3)
+def _to_4(rig: ArmatureObject, _controls: ArmatureObject) -> list[str]:
+    """Materials read animated maps from a mesh: in Direct mode the bones rest."""
+    if not rig.override_library:
+        if armatures.joints_are_shown(rig):
+            rig[parts.JOINTS_SHOWN] = True
+        values.carry_on_largest(rig)
+        carrier = parts.carrier_of(rig)
+        carrier.update_tag()
+        values.point_materials(rig, carrier if parts.BAKED not in rig else rig)
+    return []
+
+
+_STEPS = (_to_1, _to_2, _to_3, _to_4)

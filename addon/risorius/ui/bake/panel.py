@@ -3,7 +3,8 @@
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.frame import caches, hindrances, joint_readings, lateness
+from ...scene.frame import hindrances, joint_readings, lateness
+from ...scene.skinning import caches
 from .. import words
 from ..blender_types import Context, Panel, UILayout
 from ..common import FaceOnlyPanel, face_rig

@@ -11,8 +11,9 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...scene.animation import keying
 from ...scene.base import parts
-from ...scene.character import board, build, runtime
+from ...scene.character import armatures, board, build, runtime
 from ...scene.frame import evaluate
+from ...scene.skinning import ordinary
 from ...scene.upkeep import duplicates, library_overrides
 from ..blender_types import Context, Operator, Result
 from ..common import MODES, FaceOperator, face_controls, face_rig
@@ -85,7 +86,7 @@ class RISORIUS_OT_key(FaceOperator, Operator):
 
 
 class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):
-    """Switch between the live sum and real shape keys; edited keys are kept"""
+    """Choose how the face is shown: Direct, Live or real shape keys; edited keys are kept"""
 
     bl_idname = "risorius.set_shape_mode"
     bl_label = "Shapes"
@@ -101,10 +102,47 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):
             return {"CANCELLED"}
         if library_overrides.unlock_shapes(rig):
             self.report({"INFO"}, say("The linked meshes were copied into this file."))
+        ordinary.leave(rig)
         for sentence in build.change_mode(rig, self.mode):
             self.report({"WARNING"}, sentence)
         rig.update_tag()
         evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_hide_joints(FaceOperator, Operator):
+    """Hide the joints of this face: in Direct mode they are not posed"""
+
+    bl_idname = "risorius.hide_joints"
+    bl_label = "Hide Joint Rig"
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        armatures.hide_joints(rig)
+        rig.select_set(False)
+        evaluate.bring_up(context, rig)
+        return {"FINISHED"}
+
+
+class RISORIUS_OT_prepare_for_export(FaceOperator, Operator):
+    """Pose the joints of this face and enable its armature modifiers, for exporters and scripts"""
+
+    bl_idname = "risorius.prepare_for_export"
+    bl_label = "Prepare for Export"
+
+    enable: bpy.props.BoolProperty(
+        name="Prepare", description="Off: back to Direct mode", default=True, options={"SKIP_SAVE"}
+    )
+
+    def execute(self, context: Context) -> Result:
+        rig = face_rig(context)
+        if self.enable:
+            rig[parts.SKINNING] = "LIVE"
+        else:
+            rig.pop(parts.SKINNING, None)
+        evaluate.bring_up(context, rig)
+        if self.enable:
+            self.report({"INFO"}, say("Joints are posed until Direct is chosen again."))
         return {"FINISHED"}
 
 
@@ -147,6 +185,8 @@ CLASSES = (
     RISORIUS_OT_reset,
     RISORIUS_OT_key,
     RISORIUS_OT_set_shape_mode,
+    RISORIUS_OT_hide_joints,
+    RISORIUS_OT_prepare_for_export,
     RISORIUS_OT_set_overdrive,
     RISORIUS_OT_separate,
 )

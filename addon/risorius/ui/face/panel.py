@@ -5,10 +5,11 @@ from ... import native
 from ...logic.character import plans
 from ...scene.base import parts, saved
 from ...scene.base.blender_types import ArmatureObject
-from ...scene.character import rig_placement, runtime
+from ...scene.character import armatures, rig_placement, runtime
 from ...scene.file import shape_key_head
 from ...scene.hair import strands
 from ...scene.lod import lods
+from ...scene.skinning import conditions
 from .. import words
 from ..bake.panel import draw_late
 from ..blender_types import Context, Panel, UILayout
@@ -16,6 +17,8 @@ from ..common import FaceOnlyPanel, FacePanel, active_controls, face_controls, f
 from ..drag import panel as drag_panel
 from ..upkeep.panel import draw_trouble
 from . import banner
+
+_MOST_REASONS = 3  # why a face is not in Direct mode; more would fill the panel
 
 
 class RISORIUS_PT_character(FacePanel, Panel):
@@ -125,10 +128,21 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
 
 def _draw_shapes(layout: UILayout, rig: ArmatureObject) -> None:
     modes = {saved.text(m, parts.MODE) for m in parts.meshes_of(rig)}
+    if rig.get(parts.SKINNING) != "LIVE":
+        modes = {"AUTO" if mode == "LIVE" else mode for mode in modes}
+    layout.label(text="Shapes", text_ctxt=words.CONTEXT)
     row = layout.row(align=True)
-    row.label(text="Shapes", text_ctxt=words.CONTEXT)
-    for mode, text in (("LIVE", "Live"), ("KEYS", "Keys")):
+    for mode, text in (("AUTO", "Direct"), ("LIVE", "Live"), ("KEYS", "Keys")):
         row.operator("risorius.set_shape_mode", text=text, depress=mode in modes).mode = mode
+    plan = conditions.known(rig)
+    if plan is None or "AUTO" not in modes or not plan.why:
+        return
+    column = layout.column(align=True)
+    column.label(text="Not Direct now:", text_ctxt=words.CONTEXT)
+    for sentence in plan.why[:_MOST_REASONS]:
+        words.write(column, sentence)
+    if armatures.joints_are_shown(rig):
+        column.operator("risorius.hide_joints")
 
 
 class RISORIUS_PT_options(FaceOnlyPanel, Panel):

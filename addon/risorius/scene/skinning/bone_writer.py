@@ -46,7 +46,7 @@ def write(
     live: runtime.Runtime,
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion],
-    depsgraph: Depsgraph,
+    depsgraph: Depsgraph | None,
     keyed: Collection[int] = (),
 ) -> bool:
     """Write the joints that the evaluator owns; all others keep what the user gave them.
@@ -56,7 +56,8 @@ def write(
         live: its Runtime.
         deltas: float32[J, 9] of a Pose.
         turns: "neck" and "head" -> Quaternion in the armature's axes, added on top.
-        depsgraph: where the animated values of all other bones are read.
+        depsgraph: where the animated values of all other bones are read; None where they have
+            none.
         keyed: positions of bones of neck and head that keep what the user gave them, too.
 
     Returns:
@@ -70,7 +71,7 @@ def write(
             bones.foreach_set(name, values.ravel())
         return _taken(rig, {n: v.ravel() for n, v in owned.items()})
     # A bulk write that leaves out the animated values of the others would undo them.
-    seen = rig.evaluated_get(depsgraph).pose.bones
+    seen = (rig if depsgraph is None else rig.evaluated_get(depsgraph)).pose.bones
     source = seen if len(seen) == writer.count else bones
     buffers = writer.buffers or _buffers(writer.count)
     written_rows = ~np.isin(writer.where, list(keyed))

@@ -67,7 +67,7 @@ def write(
     item.data.update_tag()
 
 
-def bears_simulation(item: MeshObject) -> bool:
+def bears_simulation(item: bpy.types.Object) -> bool:
     """Whether an edit of a mesh resets a simulation: its own, or one that collides with it."""
     field = item.field is not None and item.field.type != "NONE"
     body = item.rigid_body is not None

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces in the form of files while one of Blender's own exporters works.
+
+Exporters read bones and shape keys as they are stored. In Direct mode bones rest and live keys
+have finished positions, so a file would show each face deformed twice, or not at all.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import bpy
+
+from ..base import parts, session
+from ..base.blender_types import Depsgraph, current_context
+from ..frame import evaluate
+from ..skinning import conditions
+
+_LOOK_AGAIN = 0.5  # seconds between two looks whether a dialog is still open
+
+DIALOG, GLTF = "dialog", "gltf"  # who asks for the form of files
+# Who asks -> names of the deforming armatures that are held.
+_held: dict[str, list[str]] = session.table("ordinary_form.held", ("load",))
+_drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",))
+
+
+def begin(reader: str) -> None:
+    """Give all faces the form of files until `end`.
+
+    Args:
+        reader: DIALOG or GLTF; who asks twice is counted once.
+    """
+    if reader in _held:
+        return
+    rigs = parts.rigs()
+    _held[reader] = [rig.name for rig in rigs]
+    for rig in rigs:
+        conditions.hold_ordinary(rig, on=True)
+    _bring_up()
+    if reader == GLTF and not bpy.app.timers.is_registered(_let_go):
+        # An exporter that fails does not say that it has ended.
+        bpy.app.timers.register(_let_go, first_interval=_LOOK_AGAIN)
+
+
+def end(reader: str) -> None:
+    """Let the faces be in Direct mode again. Args: reader  as for `begin`."""
+    names = _held.pop(reader, None)
+    if names is None:
+        return
+    for rig in parts.rigs():
+        if rig.name in names:
+            conditions.hold_ordinary(rig, on=False)
+    _bring_up()
+
+
+def _bring_up() -> None:
+    for scene in bpy.data.scenes:
+        for layer in scene.view_layers:
+            if layer.depsgraph is not None:
+                evaluate.evaluate_all(cast("Depsgraph", layer.depsgraph))
+                layer.update()
+
+
+def register() -> None:
+    """Watch for dialogs of exporters from now on."""
+    if _drawing.now is None:
+        space = bpy.types.SpaceFileBrowser
+        _drawing.now = space.draw_handler_add(_drawn, (), "WINDOW", "POST_PIXEL")
+
+
+def unregister() -> None:
+    """Watch no longer."""
+    if _drawing.now is not None:
+        bpy.types.SpaceFileBrowser.draw_handler_remove(_drawing.now, "WINDOW")
+        _drawing.now = None
+    for timer in (_watch, _let_go):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+    _held.clear()
+
+
+def _drawn() -> None:
+    """A file browser is drawn, in which nothing can be edited: a timer does it."""
+    space = cast("bpy.types.Space | None", current_context().space_data)
+    if _exports(space) and not bpy.app.timers.is_registered(_watch):
+        bpy.app.timers.register(_watch, first_interval=0.0)
+
+
+def _watch() -> float | None:
+    windows = current_context().window_manager.windows
+    areas = (area for window in windows for area in window.screen.areas)
+    if any(_exports(cast("bpy.types.Space", area.spaces.active)) for area in areas):
+        begin(DIALOG)
+        return _LOOK_AGAIN
+    end(DIALOG)
+    return None
+
+
+def _let_go() -> None:
+    end(GLTF)
+
+
+def _exports(space: bpy.types.Space | None) -> bool:
+    """Whether a file browser is the dialog of one of Blender's exporters."""
+    if space is None or space.type != "FILE_BROWSER":
+        return False
+    operator = cast("bpy.types.SpaceFileBrowser", space).active_operator
+    if operator is None:
+        return False
+    name = operator.bl_idname.lower()
+    return "export" in name and not name.startswith("risorius")

@@ -1,0 +1,484 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether a face can be in Direct mode: which of its meshes, and whether its bones are posed.
+
+Direct mode writes finished positions to the live key of a mesh and disables its armature modifier.
+A Plan is made when the file changes and kept while frames play.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...logic.base.sentences import Sentence, told
+from ..base import compat, drivers, parts, saved, session
+from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
+from ..character import armatures, meshes, runtime
+from . import live_keys
+
+_PLACES = ("location", "rotation", "scale", "delta")  # how data paths of an object's place begin
+_STRAIGHT = 1e-6  # of a matrix's elements, from which a mesh counts as moved against its rig
+_FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a face is shown.
+
+    Attributes:
+        direct: session uids of the mesh objects that get finished positions.
+        posed: whether the bones of the deforming armature are posed.
+        why: why bones are posed, or why a mesh is not among `direct`; empty where all is direct.
+    """
+
+    direct: frozenset[int] = frozenset()
+    posed: bool = True
+    why: tuple[Sentence, ...] = ()
+
+
+ORDINARY = Plan()  # as in a file: every mesh is deformed by its armature modifier
+
+
+@dataclass
+class _Kept:
+    """How a face was when it was looked at.
+
+    Attributes:
+        plan: Plan.
+        signature: see _signature.
+        stacks: see _stacks.
+        is_fresh: whether nothing was edited since.
+    """
+
+    plan: Plan
+    signature: tuple[object, ...]
+    stacks: tuple[int, ...]
+    is_fresh: bool = True
+
+
+# Deforming armature -> its plan.
+_kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
+# Mesh objects that were written to since Blender last told of updates: these are no edits.
+_written: set[int] = session.keep("conditions.written", set, ("undo", "load"))
+# Objects of the user's -> what they point to, see _pointed.
+_pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
+# Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
+_ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
+
+
+def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
+    """The plan of a face as last looked at; looked at now where it was edited since.
+
+    Args:
+        rig: deforming armature, the original.
+        live: the character's Runtime.
+    """
+    if rig.session_uid in _ordinary:
+        return ORDINARY
+    kept = _kept.get(rig.session_uid)
+    stacks = _stacks(rig)
+    if kept is None or not kept.is_fresh or kept.stacks != stacks:
+        kept = _kept[rig.session_uid] = _Kept(look(rig, live), _signature(rig), stacks)
+    return kept.plan
+
+
+def _stacks(rig: ArmatureObject) -> tuple[int, ...]:
+    """How many modifiers each mesh has: a script may add a simulation and go to the next frame."""
+    return tuple(len(item.modifiers) for item in parts.meshes_of(rig))
+
+
+def known(rig: ArmatureObject) -> Plan | None:
+    """The plan that a face was last shown by, None before. Args: rig  deforming armature."""
+    kept = _kept.get(rig.session_uid)
+    return kept.plan if kept is not None and rig.session_uid not in _ordinary else None
+
+
+def note_moved(rig: ArmatureObject) -> None:
+    """Joints are moved by something else than us: no edit tells of keys that a script gives them.
+
+    Args:
+        rig: deforming armature.
+    """
+    kept = _kept.get(rig.session_uid)
+    if kept is not None and kept.plan.direct:
+        kept.is_fresh = False
+
+
+def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
+    """Keep a face as files have it: bones posed, modifiers enabled; calls may be nested.
+
+    Args:
+        rig: deforming armature.
+        on: begin, or end what was begun.
+    """
+    count = _ordinary.get(rig.session_uid, 0) + (1 if on else -1)
+    if count > 0:
+        _ordinary[rig.session_uid] = count
+    else:
+        _ordinary.pop(rig.session_uid, None)
+
+
+def note_written(item: MeshObject) -> None:
+    """A mesh is written to by us: the update that follows is no edit. Args: item  the mesh."""
+    _written.add(item.session_uid)
+
+
+def end_frame() -> None:
+    """A frame was evaluated: Blender does not tell of the updates that belong to it."""
+    _written.clear()
+
+
+@dataclass
+class _Edits:
+    """What an edit concerns.
+
+    Attributes:
+        meshes: session uids of meshes of characters that somebody else edited.
+        rigs: session uids of edited deforming armatures, and of their data.
+        foreign: whether an object was edited that belongs to no character.
+    """
+
+    meshes: set[int] = field(default_factory=set)
+    rigs: set[int] = field(default_factory=set)
+    foreign: bool = False
+
+    def add(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.ID) -> None:
+        """Args: update  of the datablock; item  the original of that."""
+        if isinstance(item, bpy.types.Armature):
+            self.rigs.add(item.session_uid)
+        elif isinstance(item, bpy.types.Object):
+            self._add_object(update, item)
+        elif isinstance(item, _FOREIGN_KINDS):
+            self.foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+
+    def _add_object(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.Object) -> None:
+        uid = item.session_uid
+        if parts.MESH in item and parts.RIG in item:
+            ours = uid in _written
+            _written.discard(uid)
+            if not ours and (update.is_updated_geometry or update.is_updated_transform):
+                self.meshes.add(uid)
+        elif parts.CONTROLS in item:
+            if update.is_updated_geometry:
+                self.rigs.add(uid)
+        elif parts.RIG not in item and _may_read_anew(item):
+            self.foreign = True
+
+
+def _may_read_anew(item: bpy.types.Object) -> bool:
+    """Whether an object of the user's points to other objects than when it was last looked at.
+
+    A lamp that is dragged is edited at each step, and reads no face.
+    """
+    if any(modifier.type == "NODES" for modifier in item.modifiers):
+        return True  # inputs of geometry nodes are objects, too
+    pointed = _pointed(item)
+    if _pointing.get(item.session_uid) == pointed:
+        return False
+    _pointing[item.session_uid] = pointed
+    return True
+
+
+def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
+    """What an object points to by parent, constraints, modifiers and drivers."""
+    bones = item.pose.bones if item.pose is not None else ()
+    holds = [*item.constraints, *(hold for bone in bones for hold in bone.constraints)]
+    targets = [
+        (_uid(getattr(hold, "target", None)), getattr(hold, "subtarget", "")) for hold in holds
+    ]
+    modifiers = [_uid(getattr(modifier, "object", None)) for modifier in item.modifiers]
+    data = item.animation_data
+    count = len(data.drivers) if data is not None else 0
+    parent = (_uid(item.parent), item.parent_type, item.parent_bone)
+    return parent, tuple(targets), tuple(modifiers), count
+
+
+def _uid(thing: object) -> int:
+    """The session uid of a datablock, 0 of anything else: no Blender object is kept."""
+    return thing.session_uid if isinstance(thing, bpy.types.ID) else 0
+
+
+def note_updates(depsgraph: Depsgraph) -> set[int]:
+    """Look which plans an edit may have changed.
+
+    Args:
+        depsgraph: with the updates of the edit.
+
+    Returns:
+        Session uids of meshes that somebody else than this add-on edited.
+    """
+    edits = _Edits()
+    for update in depsgraph.updates:
+        item = update.id.original if update.id is not None else None
+        if item is not None:
+            edits.add(update, item)
+    for rig in parts.rigs():
+        kept = _kept.get(rig.session_uid)
+        if kept is None or not kept.is_fresh:
+            continue
+        own = {item.session_uid for item in parts.meshes_of(rig)} & edits.meshes
+        armature = edits.rigs & {rig.session_uid, rig.data.session_uid}
+        kept.is_fresh = not (edits.foreign or armature or own)
+    look_quickly()
+    return edits.meshes
+
+
+def look_quickly() -> None:
+    """Compare what is quickly compared of each face: modes, selection, modifiers and keys."""
+    for rig in parts.rigs():
+        kept = _kept.get(rig.session_uid)
+        if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
+            kept.is_fresh = False
+
+
+def stale(rig: ArmatureObject) -> bool:
+    """Whether a face has a plan that no longer holds. Args: rig  deforming armature."""
+    kept = _kept.get(rig.session_uid)
+    return kept is not None and not kept.is_fresh
+
+
+def _signature(rig: ArmatureObject) -> tuple[object, ...]:
+    data = rig.data
+    shown = armatures.joints_are_shown(rig)
+    own = (rig.mode, rig.select_get(), shown, data.pose_position, rig.get(parts.SKINNING))
+    return (*own, len(bpy.data.objects), *map(_mesh_signature, parts.meshes_of(rig)))
+
+
+def _mesh_signature(item: MeshObject) -> tuple[object, ...]:
+    data, key = item.data, item.data.shape_keys
+    stack = tuple((m.name, m.show_viewport, m.show_render) for m in item.modifiers)
+    first = (item.mode, stack, data.users, len(data.vertices), len(item.constraints))
+    if key is None:
+        return (*first, item.get(parts.MODE))
+    blocks = key.key_blocks
+    values, mutes = np.empty(len(blocks), np.float32), np.empty(len(blocks), bool)
+    blocks.foreach_get("value", values)
+    blocks.foreach_get("mute", mutes)
+    pinned = item.show_only_shape_key, item.active_shape_key_index, key.use_relative
+    return (*first, values.tobytes(), mutes.tobytes(), *pinned)
+
+
+def look(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
+    """Work out the plan of a face from the file as it is now.
+
+    Args:
+        rig: deforming armature.
+        live: its Runtime.
+    """
+    whole = next(_whole_face(rig, live), None)
+    if whole is not None:
+        return Plan(why=(whole,))
+    direct, why = set[int](), list[Sentence]()
+    for item in parts.meshes_of(rig):
+        cause = next(_mesh(item, rig, live), None)
+        if cause is None:
+            direct.add(item.session_uid)
+        else:
+            why.append(cause)
+    bones = [] if why else list(_readers(rig))
+    return Plan(frozenset(direct), bool(why or bones), (*why, *bones))
+
+
+def _whole_face(rig: ArmatureObject, live: runtime.Runtime) -> Iterator[Sentence]:
+    """Why no mesh of a face can get finished positions."""
+    if rig.get(parts.SKINNING) == "LIVE":
+        yield told("Live mode is chosen.")
+    if rig.library or rig.override_library or rig.data.library:
+        yield told("The character is linked from another file.")
+    if rig.mode != "OBJECT":
+        yield told("{rig} is in pose or edit mode.", rig=rig.name)
+    if rig.data.pose_position != "POSE":
+        yield told("{rig} shows its rest position.", rig=rig.name)
+    if drivers.moves(rig):
+        yield told("Joints of {rig} have keys or drivers of their own.", rig=rig.name)
+    if any(len(bone.constraints) for bone in rig.pose.bones):
+        yield told("Joints of {rig} have constraints.", rig=rig.name)
+    changed = _changed_bone(rig, live)
+    if changed:
+        yield told("The settings of the joint {bone} were changed.", bone=changed)
+
+
+_BONE_FLAGS = {
+    "use_deform": True,
+    "use_inherit_rotation": True,
+    "use_local_location": True,
+    "use_connect": False,
+    "use_envelope_multiply": False,
+    "use_relative_parent": False,
+}
+
+
+def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
+    """The name of a bone that Blender poses otherwise than the evaluator thinks, else empty."""
+    bones = rig.data.bones
+    count = len(bones)
+    wrong = np.zeros(count, bool)
+    for name, wanted in _BONE_FLAGS.items():
+        flags = np.empty(count, bool)
+        bones.foreach_get(name, flags)
+        wrong |= flags != wanted
+    segments, scales = np.empty(count, np.int32), np.empty(count, np.int32)
+    bones.foreach_get("bbone_segments", segments)
+    bones.foreach_get("inherit_scale", scales)
+    wrong |= (segments != 1) | (scales != 0)
+    if wrong.any():
+        return bones[int(np.argmax(wrong))].name
+    modes = np.empty(len(rig.pose.bones), np.int32)
+    rig.pose.bones.foreach_get("rotation_mode", modes)
+    for place in np.flatnonzero(modes != 0).tolist():
+        bone = rig.pose.bones[place]
+        if saved.whole(bone.bone, parts.JOINT, -1) in live.owned:
+            return bone.name
+    return ""
+
+
+def _mesh(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> Iterator[Sentence]:
+    """Why a mesh cannot get finished positions."""
+    data = item.data
+    if item.library or item.override_library or data.library or data.override_library:
+        yield told("{mesh} is linked from another file.", mesh=item.name)
+        return
+    if item.mode != "OBJECT":
+        yield told("{mesh} is being edited.", mesh=item.name)
+    if data.users - data.use_fake_user > 1:
+        yield told("{mesh} shares its data with another object.", mesh=item.name)
+    number = runtime.mesh_number(live, item)
+    if number is None or len(data.vertices) != live.vertex_count(number):
+        yield told("{mesh} has not the vertices of its file.", mesh=item.name)
+        return
+    yield from _standing(item, rig)
+    yield from _modifiers(item, rig)
+    yield from _keys(item, rig, live, number)
+    if live_keys.bears_simulation(item):
+        yield told("{mesh} bears a simulation, whose cache an edit would reset.", mesh=item.name)
+
+
+def _standing(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
+    """Whether a mesh stands where its rig stands."""
+    place = np.array(item.matrix_parent_inverse @ item.matrix_basis)
+    moved = np.abs(place - np.eye(4)).max() > _STRAIGHT
+    moved = moved or item.parent != rig or item.parent_type != "OBJECT" or len(item.constraints)
+    if moved or any(curve.data_path.startswith(_PLACES) for curve in _curves(item)):
+        yield told("{mesh} was moved against {rig}.", mesh=item.name, rig=rig.name)
+
+
+def _curves(owner: bpy.types.Object | bpy.types.Key) -> Iterator[bpy.types.FCurve]:
+    data = owner.animation_data
+    if data is not None:
+        for action in compat.played_actions(owner):
+            yield from compat.curves_for(action, owner)
+        yield from data.drivers
+
+
+def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModifier | None:
+    """The armature modifier through which a rig deforms a mesh: the first one.
+
+    Args:
+        item: the mesh.
+        rig: the deforming armature.
+    """
+    for modifier in item.modifiers:
+        if isinstance(modifier, bpy.types.ArmatureModifier) and modifier.object == rig:
+            return modifier
+    return None
+
+
+def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
+    """Whether our armature modifier is the first that is enabled, and as it was built."""
+    own = armature_of(item, rig)
+    if own is None:
+        yield told("{mesh} has no armature modifier of {rig}.", mesh=item.name, rig=rig.name)
+        return
+    enabled = own.show_viewport and own.show_render
+    if not enabled and parts.FINISHED not in item:
+        yield told("The armature modifier of {mesh} is disabled.", mesh=item.name)
+    plain = own.use_vertex_groups and not own.use_bone_envelopes
+    plain = plain and not own.use_deform_preserve_volume and not own.use_multi_modifier
+    if not plain or own.vertex_group:
+        yield told("The armature modifier of {mesh} was changed.", mesh=item.name)
+    for modifier in item.modifiers:
+        if modifier == own:
+            return
+        if modifier.show_viewport or modifier.show_render:
+            yield told(
+                "The modifier {modifier} of {mesh} comes before the armature.",
+                modifier=modifier.name,
+                mesh=item.name,
+            )
+
+
+def _keys(
+    item: MeshObject, rig: ArmatureObject, live: runtime.Runtime, number: int
+) -> Iterator[Sentence]:
+    """Whether the live key alone shapes a mesh."""
+    key, block = item.data.shape_keys, meshes.live_block(item)
+    if key is None or block is None:
+        if key is not None or live.morph(number).channel_indices.size:
+            yield told("{mesh} has real shape keys.", mesh=item.name)
+        return
+    others = (b for b in key.key_blocks if b not in (block, key.reference_key))
+    used = [b for b in others if b.value and not b.mute]
+    pinned = item.show_only_shape_key or not key.use_relative
+    if used or pinned or parts.REAL in key or next(_curves(key), None) is not None:
+        yield told("{mesh} has shape keys of its own that are in use.", mesh=item.name)
+    plain = block.value == 1.0 and not block.mute and not block.vertex_group
+    if not plain or block.relative_key != key.reference_key:
+        yield told("The live key of {mesh} was changed.", mesh=item.name)
+    if len(block.points) != len(item.data.vertices):
+        yield told("{mesh} has not the vertices of its file.", mesh=item.name)
+
+
+def _readers(rig: ArmatureObject) -> Iterator[Sentence]:
+    """Why bones have to be posed although no mesh needs them."""
+    controls = parts.controls_there(rig)
+    if rig.select_get():
+        yield told("{rig} is selected.", rig=rig.name)
+    if parts.JOINTS_SHOWN not in rig and armatures.joints_are_shown(rig):
+        yield told("The joints of {rig} are shown.", rig=rig.name)
+    own = {controls, *parts.meshes_of(rig)}
+    for user in bpy.data.user_map(subset=[rig])[rig]:
+        if isinstance(user, (bpy.types.Scene, bpy.types.Collection)):
+            continue
+        if isinstance(user, bpy.types.Object) and user in own and not _reads_bones(user, rig):
+            continue
+        if isinstance(user, bpy.types.Material) and not _drives_more(user, rig):
+            continue
+        yield told("{user} uses {rig}.", user=user.name, rig=rig.name)
+
+
+def _reads_bones(item: bpy.types.Object, rig: ArmatureObject) -> bool:
+    """Whether an object of the character itself reads bones beside what it was built with."""
+    count = 0
+    for modifier in item.modifiers:
+        properties = modifier.bl_rna.properties
+        pointed = (getattr(modifier, p.identifier) for p in properties if p.type == "POINTER")
+        count += any(thing == rig for thing in pointed)
+    holds = [*item.constraints]
+    if item.pose is not None:
+        holds += [hold for bone in item.pose.bones for hold in bone.constraints]
+    if count > (1 if item.type == "MESH" else 0) or any(_targets(hold, rig) for hold in holds):
+        return True
+    return _has_driver_on(item, rig) or _has_driver_on(item.data, rig)
+
+
+def _targets(hold: bpy.types.Constraint, rig: ArmatureObject) -> bool:
+    targets = [getattr(hold, "target", None), *(t.target for t in getattr(hold, "targets", ()))]
+    return rig in targets
+
+
+def _has_driver_on(owner: bpy.types.ID | None, rig: ArmatureObject) -> bool:
+    data = getattr(owner, "animation_data", None)
+    return any(
+        target.id == rig
+        for curve in (data.drivers if data else ())
+        for variable in compat.driver_of(curve).variables
+        for target in variable.targets
+    )
+
+
+def _drives_more(material: bpy.types.Material, rig: ArmatureObject) -> bool:
+    """Whether a material reads the rig itself, not only through its node tree's own drivers."""
+    return _has_driver_on(material, rig) or _has_driver_on(material.node_tree, rig)

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finished positions of a face in the live keys of its meshes, with no bone posed.
+
+A mesh in Direct mode bears the property FINISHED, which undo, duplicates and files that Blender
+saves by itself keep: its live key has final positions, and its armature modifier is disabled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import bmesh
+import numpy as np
+from mathutils import Quaternion
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import last_written, parts, session
+from ..base.blender_types import ArmatureObject, MeshObject
+from ..character import meshes, runtime
+from . import bone_writer, conditions, skins
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a face was shown with.
+
+    Attributes:
+        joints: float32[J, 9] of a Pose.
+        weights: float32[C] of the channels.
+        turns: "neck" and "head" -> Quaternion in the armature's axes.
+    """
+
+    joints: NDArray[np.float32]
+    weights: NDArray[np.float32]
+    turns: Mapping[str, Quaternion]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the meshes of a face are written with.
+
+    Attributes:
+        live: the Runtime.
+        shape: Shape.
+        bones: of the deforming armature.
+        writer: of the bones that the evaluator owns.
+    """
+
+    live: runtime.Runtime
+    shape: Shape
+    bones: skins.Bones
+    writer: bone_writer.Writer
+
+    def bone_channels(self) -> dict[str, NDArray[np.float32]]:
+        """ "location", "rotation_quaternion", "scale" -> float32[B, width] of all bones."""
+        bones, writer = self.bones, self.writer
+        owned = bone_writer.pose_of(writer, self.shape.joints, self.shape.turns)
+        rest = (bones.location, bones.rotation, bones.scale)
+        channels = dict(zip(owned, (values.copy() for values in rest), strict=True))
+        for name, values in channels.items():
+            values[writer.where] = owned[name]
+        return channels
+
+    def matrices(self) -> NDArray[np.float32]:
+        """float32[B, 3, 4], the skinning matrices of the bones in the armature's space."""
+        return self.bones.chain.evaluate(*self.bone_channels().values())
+
+
+@dataclass(frozen=True)
+class _Face:
+    """Attributes: face  compiled; skins  mesh object -> its Skin; bones, writer  see Frame."""
+
+    face: native.DirectFace
+    skins: dict[int, skins.Skin]
+    bones: skins.Bones
+    writer: bone_writer.Writer
+
+
+@dataclass(frozen=True)
+class Job:
+    """A face whose meshes are to be written. Attributes: face; frame; items  by their number."""
+
+    face: native.DirectFace
+    frame: Frame
+    items: dict[int, MeshObject]
+    anew: bool
+
+
+# Deforming armature -> the Frame that was last written; what is compiled of the face.
+_shown: dict[int, Frame] = session.table("direct.shown", ("rewrite", "undo", "load"))
+_faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
+
+
+def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
+    """Bring the meshes of a face into the modes of a plan.
+
+    Args:
+        rig: deforming armature.
+        plan: of the face.
+
+    Returns:
+        Whether a mesh changed its mode: what was last written says nothing of it then.
+    """
+    changed = False
+    for item in parts.meshes_of(rig):
+        wanted = item.session_uid in plan.direct
+        if wanted and not _is_taken(item, rig):
+            take(item, rig)
+            changed = True
+        elif not wanted and parts.FINISHED in item:
+            give_back(item, rig)
+            changed = True
+    return changed
+
+
+def _is_taken(item: MeshObject, rig: ArmatureObject) -> bool:
+    own = conditions.armature_of(item, rig)
+    off = own is not None and not own.show_viewport and not own.show_render
+    return off and parts.FINISHED in item and meshes.live_block(item) is not None
+
+
+def take(item: MeshObject, rig: ArmatureObject) -> None:
+    """Bring a mesh into Direct mode; its positions are written afterwards.
+
+    Args:
+        item: the mesh object, which gets a live key where it has none.
+        rig: deforming armature.
+    """
+    if meshes.live_block(item) is None:
+        meshes.add_live_key(item)
+    item[parts.FINISHED] = True
+    own = conditions.armature_of(item, rig)
+    assert own is not None
+    own.show_viewport = own.show_render = False
+    _forget(item)
+
+
+def give_back(item: MeshObject, rig: ArmatureObject) -> None:
+    """Bring a mesh out of Direct mode: its modifier deforms it again.
+
+    Args:
+        item: the mesh object.
+        rig: deforming armature; the live key is written afterwards.
+    """
+    item.pop(parts.FINISHED, None)
+    own = conditions.armature_of(item, rig)
+    if own is not None:
+        own.show_viewport = own.show_render = True
+    if item.mode == "EDIT":
+        _reset_edited(item)
+    _forget(item)
+
+
+def _reset_edited(item: MeshObject) -> None:
+    """Give the live key of a mesh in edit mode the neutral form: leaving the mode stores it."""
+    edit, block = bmesh.from_edit_mesh(item.data), meshes.live_block(item)
+    layers: Any = edit.verts.layers.shape
+    key = item.data.shape_keys
+    if block is None or key is None or block.name not in layers.keys():  # noqa: SIM118  no dict
+        return
+    live, base = layers[block.name], layers[key.reference_key.name]
+    for vertex in edit.verts:
+        vertex[live] = vertex[base]
+
+
+def _forget(item: MeshObject) -> None:
+    key = item.data.shape_keys
+    if key is not None:
+        last_written.weights.pop(key.session_uid, None)
+
+
+def shown(rig: ArmatureObject) -> Frame | None:
+    """What a face was last shown with; None where none of its meshes is in Direct mode.
+
+    Args:
+        rig: deforming armature.
+    """
+    return _shown.get(rig.session_uid)
+
+
+def prepare(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    shape: Shape,
+    items: Sequence[MeshObject],
+    anew: bool,
+) -> Job:
+    """Compile what of a face is not compiled yet.
+
+    Args:
+        rig: deforming armature; nothing is written to it.
+        live: its Runtime.
+        shape: what the face is shown with.
+        items: the mesh objects in Direct mode that are written.
+        anew: write also what seems unchanged.
+    """
+    bones, writer = skins.bones_of(rig), bone_writer.writer_of(rig, live)
+    frame = _shown[rig.session_uid] = Frame(live, shape, bones, writer)
+    wanted = {item.session_uid: skins.of(item, bones, live) for item in items}
+    kept = _faces.get(rig.session_uid)
+    if kept is None or kept.bones is not bones or kept.writer is not writer:
+        kept = None
+    if kept is None or any(kept.skins.get(uid) is not skin for uid, skin in wanted.items()):
+        others = {} if kept is None else kept.skins  # of other levels of detail
+        kept = _faces[rig.session_uid] = _compile(frame, {**others, **wanted})
+    order = {uid: number for number, uid in enumerate(kept.skins)}
+    found = {order[item.session_uid]: item for item in items}
+    return Job(kept.face, frame, found, anew)
+
+
+def _compile(frame: Frame, found: dict[int, skins.Skin]) -> _Face:
+    bones, writer = frame.bones, frame.writer
+    face = native.module().DirectFace(
+        frame.live.rig,
+        writer.space,
+        bones.chain,
+        writer.where,
+        [(frame.live.morph(skin.mesh), skin.base, skin.skin) for skin in found.values()],
+        turned=[row for _name, row, _share, _rest in writer.turning],
+    )
+    face.keep(bones.location, bones.rotation, bones.scale)
+    return _Face(face, found, bones, writer)
+
+
+def write(jobs: Sequence[Job]) -> None:
+    """Write finished positions to the live keys of faces, all faces at once.
+
+    Args:
+        jobs: see `prepare`.
+    """
+    targets = [_addresses(job.items) for job in jobs]
+    done = native.module().deform_faces(
+        [job.face for job in jobs],
+        [job.frame.shape.joints for job in jobs],
+        [job.frame.shape.weights for job in jobs],
+        targets,
+        turns=[_turns(job.frame) for job in jobs],
+        anew=any(job.anew for job in jobs),
+    )
+    for job, written in zip(jobs, done, strict=True):
+        for number in written:
+            item = job.items[number]
+            conditions.note_written(item)
+            item.data.update_tag()
+
+
+def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
+    """Mesh -> address and number of the points of its live key."""
+    found = {}
+    for number, item in items.items():
+        block = meshes.live_block(item)
+        if block is not None and len(block.points):
+            points = block.points
+            found[number] = (points[0].as_pointer(), len(points))
+    return found
+
+
+def _turns(frame: Frame) -> NDArray[np.float32] | None:
+    """What turns the joints of neck and head, in the axes of their bones: float32[t, 4]."""
+    turns, turning = frame.shape.turns, frame.writer.turning
+    if not turns or not turning:
+        return None
+    found = np.tile(np.array([1, 0, 0, 0], np.float32), (len(turning), 1))
+    for place, (name, _row, share, rest) in enumerate(turning):
+        if name in turns:
+            part = Quaternion().slerp(turns[name], share) if share < 1.0 else turns[name]
+            found[place] = rest.inverted() @ part @ rest
+    return found

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The form of a face in files, bones posed and modifiers enabled, while it is in Direct mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import last_written, parts, session
+from ..base.blender_types import ArmatureObject, MeshObject
+from ..character import meshes
+from . import bone_writer, conditions, direct
+
+# Mesh object -> the finished positions that it had before the file was written.
+_finished: dict[int, NDArray[np.float32]] = session.table("ordinary.finished", ("undo", "load"))
+
+
+def take_on(rigs: Iterable[ArmatureObject]) -> None:
+    """Give faces the form of files, for a file that is written now. Nothing is evaluated.
+
+    Args:
+        rigs: deforming armatures.
+    """
+    _finished.clear()
+    for rig in rigs:
+        for item in _finished_meshes(rig):
+            block = meshes.live_block(item)
+            if block is not None:
+                _finished[item.session_uid] = meshes.points_of(block)
+        leave(rig)
+
+
+def leave(rig: ArmatureObject) -> None:
+    """Bring a face out of Direct mode as it is seen; the next evaluation brings it back.
+
+    Args:
+        rig: deforming armature.
+    """
+    frame, found = direct.shown(rig), _finished_meshes(rig)
+    if not found:
+        return
+    if frame is not None:
+        bone_writer.write(rig, frame.live, frame.shape.joints, frame.shape.turns, None)
+    for item in found:
+        direct.give_back(item, rig)
+        block, key = meshes.live_block(item), item.data.shape_keys
+        if block is None or key is None:
+            continue
+        rest = meshes.points_of(key.reference_key)
+        if frame is not None and len(rest) == frame.live.vertex_count(item[parts.MESH]):
+            morph = frame.live.morph(item[parts.MESH])
+            rest = morph.evaluate(frame.shape.weights, base=rest)
+        block.points.foreach_set("co", rest.ravel())
+        conditions.note_written(item)
+        item.data.update_tag()
+    last_written.inputs.pop(rig.session_uid, None)
+
+
+def _finished_meshes(rig: ArmatureObject) -> list[MeshObject]:
+    return [item for item in parts.meshes_pointing_at(rig) if parts.FINISHED in item]
+
+
+def take_off(rigs: Iterable[ArmatureObject]) -> None:
+    """After `take_on`: bring the faces back into Direct mode. Args: rigs  the same."""
+    for rig in rigs:
+        for item in parts.meshes_of(rig):
+            points = _finished.pop(item.session_uid, None)
+            block, own = meshes.live_block(item), conditions.armature_of(item, rig)
+            if points is None or block is None or own is None:
+                continue
+            direct.take(item, rig)
+            block.points.foreach_set("co", points.ravel())
+            conditions.note_written(item)
+            item.data.update_tag()
+    _finished.clear()

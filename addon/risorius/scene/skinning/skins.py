@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The bones and skin weights of a face as Blender has them, compiled for the native skinning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mathutils import Matrix
+from numpy.typing import NDArray
+
+from ... import native
+from ..base import parts, saved, session
+from ..base.blender_types import ArmatureObject, MeshObject
+from ..character import meshes, runtime
+
+_SAMPLES = 16  # vertices whose weights tell that undo left a mesh as it was
+
+
+@dataclass
+class Bones:
+    """The bones of a deforming armature.
+
+    Attributes:
+        names: bone -> its place among the pose's bones.
+        joints: joint -> the place of its bone.
+        chain: risorius.JointChain of them.
+        location, rotation, scale: float32[B, 3 or 4 (w x y z)] of all bones; the evaluator writes
+            the rows of its joints.
+    """
+
+    names: dict[str, int]
+    joints: dict[int, int]
+    chain: native.JointChain
+    location: NDArray[np.float32]
+    rotation: NDArray[np.float32]
+    scale: NDArray[np.float32]
+
+
+@dataclass
+class Skin:
+    """The skin of a mesh.
+
+    Attributes:
+        mesh: its number in the DNA.
+        skin: risorius.Skin of its vertex groups.
+        base: float32[V, 3], its reference key.
+        mark: see _mark.
+    """
+
+    mesh: int
+    skin: native.Skin
+    base: NDArray[np.float32]
+    mark: tuple[object, ...]
+
+
+# Deforming armature -> Bones; mesh object -> Skin.
+_bones: dict[int, Bones] = session.table("skins.bones", ("rewrite", "undo", "load"))
+_skins: dict[int, Skin] = session.table("skins.skins", ("load",))
+_unsure: set[int] = session.keep("skins.unsure", set, ("load",))
+
+
+@session.at("rewrite", "undo")
+def doubt() -> None:
+    """After undo, or another file's data, a skin is compared with its mesh before it is used."""
+    _unsure.update(_skins)
+
+
+def forget(uids: set[int]) -> None:
+    """Meshes were edited. Args: uids  of the mesh objects."""
+    for uid in uids:
+        _skins.pop(uid, None)
+        meshes.note_edit(uid)
+
+
+def forget_bones(rig: ArmatureObject) -> None:
+    """Bones of an armature were edited. Args: rig  deforming armature."""
+    _bones.pop(rig.session_uid, None)
+
+
+def bones_of(rig: ArmatureObject) -> Bones:
+    """The bones of an armature as they are now. Args: rig  deforming armature."""
+    kept = _bones.get(rig.session_uid)
+    if kept is None or len(kept.names) != len(rig.pose.bones):
+        kept = _bones[rig.session_uid] = _read_bones(rig)
+    return kept
+
+
+def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
+    """The skin of a mesh as it is now.
+
+    Args:
+        item: the mesh object.
+        bones: those of its deforming armature.
+        live: the character's Runtime.
+    """
+    uid = item.session_uid
+    kept = _skins.get(uid)
+    if kept is not None and uid in _unsure and not _is_as_read(kept, item):
+        kept = None
+    _unsure.discard(uid)
+    if kept is None:
+        kept = _skins[uid] = _read_skin(item, bones, live)
+    return kept
+
+
+def _read_bones(rig: ArmatureObject) -> Bones:
+    rests, posed = rig.data.bones, rig.pose.bones
+    names = {bone.name: place for place, bone in enumerate(posed)}
+    rest = np.empty((len(rests), 4, 4), np.float32)
+    rests.foreach_get("matrix_local", rest.ravel())
+    rest = rest.transpose(0, 2, 1)  # Blender's columns lie one after the other
+    order = [names[bone.name] for bone in rests]
+    parents = np.full(len(posed), -1, np.int32)
+    for place, bone in zip(order, rests, strict=True):
+        if bone.parent is not None:
+            parents[place] = names[bone.parent.name]
+    sorted_rest = np.empty_like(rest)
+    sorted_rest[order] = rest
+    location = np.zeros((len(posed), 3), np.float32)
+    rotation = np.tile(np.array([1, 0, 0, 0], np.float32), (len(posed), 1))
+    scale = np.ones((len(posed), 3), np.float32)
+    basis = np.empty((len(posed), 16), np.float32)
+    posed.foreach_get("matrix_basis", basis.ravel())
+    straight = np.eye(4, dtype=np.float32).ravel()
+    for place in np.flatnonzero((basis != straight).any(axis=1)).tolist():
+        matrix = Matrix(basis[place].reshape(4, 4).T.tolist())
+        moved, turned, sized = matrix.decompose()
+        location[place], rotation[place], scale[place] = moved, turned, sized
+    chain = native.module().JointChain(parents, sorted_rest)
+    numbers = {bone.name: saved.whole(bone, parts.JOINT, -1) for bone in rests}
+    joints = {number: names[name] for name, number in numbers.items() if number >= 0}
+    return Bones(names, joints, chain, location, rotation, scale)
+
+
+def _read_skin(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
+    count = len(item.data.vertices)
+    fresh = meshes.fresh_weights(item)
+    counts, places, weights = (
+        _weights_of_file(item, bones, live) if fresh else _weights_of_groups(item, bones)
+    )
+    kept = (places >= 0) & (weights > 0.0)
+    owner = np.repeat(np.arange(count), counts)[kept]
+    offsets = np.zeros(count + 1, np.uint32)
+    np.cumsum(np.bincount(owner, minlength=count), out=offsets[1:])
+    skin = native.module().Skin(
+        count, offsets, places[kept].astype(np.uint32), weights[kept], len(bones.names)
+    )
+    return Skin(item[parts.MESH], skin, meshes.basis_of(item), _mark(item))
+
+
+_Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
+
+
+def _weights_of_file(item: MeshObject, bones: Bones, live: runtime.Runtime) -> _Weights:
+    """As _weights_of_groups, of a mesh that was built a moment ago."""
+    data = live.dna.meshes[item[parts.MESH]]
+    place_of = np.full(len(live.rest), -1, np.int64)
+    place_of[list(bones.joints)] = list(bones.joints.values())
+    counts = np.diff(np.asarray(data.skin_offsets, np.int64))
+    places = place_of[np.asarray(data.skin_joint_indices, np.int64)]
+    weights = np.asarray(data.skin_weights, np.float32)
+    if len(counts) != len(item.data.vertices):  # built without weights: the file has no skin
+        return np.zeros(len(item.data.vertices), np.int64), places[:0], weights[:0]
+    return counts, places, weights
+
+
+def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
+    """The weights of a mesh's vertex groups.
+
+    Returns:
+        int64[V] weights of each vertex; int64[N] the place of each weight's bone, -1 for none;
+        float32[N] the weights.
+    """
+    vertices, groups_there = item.data.vertices, item.vertex_groups
+    counts = np.fromiter((len(v.groups) for v in vertices), np.int64, len(vertices))
+    groups, weights = np.empty(counts.sum(), np.int32), np.empty(counts.sum(), np.float32)
+    begin = 0
+    for vertex, count in zip(vertices, counts.tolist(), strict=True):
+        held = vertex.groups  # in bulk: a Python object for each weight takes four times as long
+        held.foreach_get("group", groups[begin : begin + count])
+        held.foreach_get("weight", weights[begin : begin + count])
+        begin += count
+    places = np.full(max(len(groups_there), int(groups.max(initial=-1)) + 1), -1, np.int64)
+    places[: len(groups_there)] = [bones.names.get(group.name, -1) for group in groups_there]
+    return counts, places[groups], weights
+
+
+def _is_as_read(skin: Skin, item: MeshObject) -> bool:
+    return skin.mark == _mark(item) and np.array_equal(skin.base, meshes.basis_of(item))
+
+
+def _mark(item: MeshObject) -> tuple[object, ...]:
+    """What differs once undo has read a mesh anew: addresses and weights of some vertices."""
+    data = item.data
+    count = len(data.vertices)
+    rows: list[object] = [count, tuple(group.name for group in item.vertex_groups)]
+    for place in range(0, count, max(1, count // _SAMPLES)):
+        groups = data.vertices[place].groups
+        rows.append(tuple((e.as_pointer(), e.group, e.weight) for e in groups))
+    return tuple(rows)

@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: MIT
+// DirectFace: from controls to the finished vertices of a face's meshes, many faces at once.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/aligned.h"
+#include "core/result.h"
+#include "rig/outputs/bone_space.h"
+#include "rig/outputs/joint_chain.h"
+#include "rig/outputs/morph.h"
+#include "rig/outputs/skin.h"
+#include "rig/pose.h"
+
+namespace risorius::rig {
+
+/// What a face is made of. The armature may have more bones than the rig moves: these keep what
+/// `keep` said last.
+struct FaceParts {
+  struct Mesh {
+    std::shared_ptr<const Morph> morph;
+    std::shared_ptr<const Skin> skin;
+    std::vector<float> base;  // [vertices, 3]: no channel, no bone moves them
+  };
+  std::shared_ptr<const Rig> rig;
+  std::shared_ptr<const BoneSpace> space;
+  std::shared_ptr<const JointChain> chain;
+  std::vector<std::uint32_t> rows;    // of each bone of space: which of the chain it is
+  std::vector<std::uint32_t> turned;  // which bones of space a frame's turns are added to
+  std::vector<Mesh> meshes;
+};
+
+/// Where the vertices of a mesh go.
+struct Target {
+  std::uint32_t mesh = 0;
+  float* out = nullptr;  // [vertices, 3]
+  bool written = false;  // afterwards: false where nothing of the mesh changed since the last time
+};
+
+/// A frame of a face.
+/// raw    float32[R]; nullptr: the pose is given
+/// pose   what the rig gives, written unless its pointers are null; or what is given: joints and
+///        blend_shapes
+/// turns  float32[turned, 4], w x y z: each is multiplied from the left to what its bone keeps;
+///        nullptr: none
+/// anew   targets are written though nothing changed
+struct FaceFrame {
+  const float* raw = nullptr;
+  std::uint32_t lod = 0;
+  PoseView pose;
+  const float* turns = nullptr;
+  bool anew = false;
+  std::vector<Target> targets;  // no mesh twice
+};
+
+/// One face from frame to frame: it remembers what it wrote where. One thread at a time.
+class DirectFace {
+ public:
+  /// Fails: invalid_index, invalid_length or invalid_value where the parts do not belong together.
+  static core::Result<std::unique_ptr<DirectFace>> make(FaceParts parts);
+
+  const FaceParts& parts() const { return parts_; }
+  /// What all bones keep: [bones of chain, 3], [.., 4], [.., 3]; those of rows are overwritten.
+  void keep(const float* location, const float* rotation, const float* scale);
+  /// In: mesh  below the number of meshes; base  float32[vertices, 3]
+  void set_base(std::uint32_t mesh, const float* base);
+  /// The next frame writes every mesh.
+  void forget() noexcept;
+
+  // The steps of evaluate_faces.
+  /// The rig, the bones and what changed. Allocates nothing.
+  void begin(const FaceFrame& frame) noexcept;
+  /// After begin: whether the target has to be written.
+  bool is_due(const FaceFrame& frame, const Target& target) const noexcept;
+  /// After begin, by any thread: one block of a mesh.
+  void write(const Target& target, std::uint32_t block) const noexcept;
+  /// After all blocks of a target.
+  void end(const Target& target) noexcept;
+
+ private:
+  struct Mesh {
+    std::vector<std::uint32_t> starts;  // [channels, blocks + 1] into the deltas of the morph
+    std::vector<std::uint32_t> active;  // the channels of the morph that are not 0
+    std::size_t active_count = 0;
+    std::uint64_t written = 0;  // the frame; 0: never
+    const float* out = nullptr;
+  };
+
+  explicit DirectFace(FaceParts parts);
+  void evaluate_rig(const FaceFrame& frame) noexcept;
+  void evaluate_joints(const float* joints, const float* turns) noexcept;
+  void note_channels(const float* weights) noexcept;
+  void list_active(std::size_t mesh, const float* weights) noexcept;
+
+  FaceParts parts_;
+  std::vector<Mesh> meshes_;
+  std::uint64_t frame_ = 0;
+  // The rig, and the controls that the pose is of.
+  Workspace work_;
+  Pose pose_;
+  std::vector<float> raw_;
+  std::uint32_t lod_ = 0;
+  bool has_pose_ = false;
+  // Of the bones of space, in this order: location, rotation, scale.
+  std::vector<float> own_;
+  // Of all bones, now and in the frame before.
+  std::vector<float> channels_, last_channels_;
+  bool has_matrices_ = false;
+  std::vector<JointChain::Affine> affine_;
+  std::vector<float> matrices_, last_matrices_;
+  core::AlignedVector<float> rows_;
+  std::vector<float> weights_;
+  // The frame in which each changed last.
+  std::vector<std::uint64_t> bone_changed_, channel_changed_;
+};
+
+/// Evaluates a frame of each face, in as many threads as the work is worth. What is written does
+/// not depend on their number. In:  faces    different ones
+///      frames   of each; what they write may not overlap
+///      threads  so many; 0: as many as the work is worth, and no more than there are cores
+void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
+                    std::size_t threads);
+
+}  // namespace risorius::rig

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""Frames of faces, written by a loop that knows nothing of faces: they take Blender's own time."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+CHANNELS = {"location": 3, "rotation_quaternion": 4, "scale": 3}
+
+
+class Bare:
+    """What the add-on wrote: finished positions, or bones and live keys where they are posed."""
+
+    def __init__(self, rigs):
+        # Names: an undo makes all objects anew.
+        self.rigs, self.poses, self.turn = [rig.name for rig in rigs], [], 0
+
+    def remember(self):
+        """Keep what stands in the scene now as one of the poses that are written in turn."""
+        pose = []
+        for rig in map(bpy.data.objects.get, self.rigs):
+            meshes = [item for item in rig.children_recursive if item.type == "MESH"]
+            bones = {}
+            for name, width in CHANNELS.items():
+                bones[name] = np.empty(len(rig.pose.bones) * width, np.float32)
+                rig.pose.bones.foreach_get(name, bones[name])
+            if any("risorius_finished" in item for item in meshes):
+                bones = {}
+            keys = []
+            for item in meshes:
+                key = item.data.shape_keys
+                if key is not None and len(key.key_blocks) == 2 and not item.hide_viewport:
+                    points = np.empty(len(key.key_blocks[1].points) * 3, np.float32)
+                    key.key_blocks[1].points.foreach_get("co", points)
+                    keys.append((item.name, points))
+            pose.append((rig.name, bones, keys))
+        self.poses.append(pose)
+
+    def begin(self):
+        """Disable the modifiers of what gets finished positions: the add-on enabled them."""
+        for rig_name, bones, keys in self.poses[0]:
+            for item_name, _points in keys if not bones else ():
+                for modifier in bpy.data.objects[item_name].modifiers:
+                    ours = modifier.type == "ARMATURE" and modifier.object.name == rig_name
+                    if ours and modifier.show_viewport:
+                        modifier.show_viewport = False
+
+    def write(self, *_arguments):
+        """Write the next pose; a handler of Blender may call it."""
+        self.turn += 1
+        for rig_name, bones, keys in self.poses[self.turn % len(self.poses)]:
+            rig = bpy.data.objects[rig_name]
+            for name, values in bones.items():
+                rig.pose.bones.foreach_set(name, values)
+            if bones:
+                rig.update_tag(refresh={"OBJECT"})
+            for item_name, points in keys:
+                item = bpy.data.objects[item_name]
+                key = item.data.shape_keys
+                key.key_blocks[1].points.foreach_set("co", points)
+                if bones:
+                    key.update_tag()
+                item.data.update_tag()
