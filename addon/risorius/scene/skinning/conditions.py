@@ -296,6 +296,9 @@ def _whole_face(rig: ArmatureObject, live: runtime.Runtime) -> Iterator[Sentence
         yield told("Joints of {rig} have keys or drivers of their own.", rig=rig.name)
     if any(len(bone.constraints) for bone in rig.pose.bones):
         yield told("Joints of {rig} have constraints.", rig=rig.name)
+    for item in parts.meshes_of(rig):
+        if _has_real_keys(item, live):
+            yield told("{mesh} has real shape keys.", mesh=item.name)
     changed = _changed_bone(rig, live)
     if changed:
         yield told("The settings of the joint {bone} were changed.", bone=changed)
@@ -410,14 +413,21 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
             )
 
 
+def _has_real_keys(item: MeshObject, live: runtime.Runtime) -> bool:
+    """Whether the channels of a mesh are keys: the face is in the mode Keys."""
+    number = runtime.mesh_number(live, item)
+    moves = number is not None and live.morph(number).channel_indices.size > 0
+    return moves and meshes.live_block(item) is None
+
+
 def _keys(
     item: MeshObject, rig: ArmatureObject, live: runtime.Runtime, number: int
 ) -> Iterator[Sentence]:
     """Whether the live key alone shapes a mesh."""
     key, block = item.data.shape_keys, meshes.live_block(item)
     if key is None or block is None:
-        if key is not None or live.morph(number).channel_indices.size:
-            yield told("{mesh} has real shape keys.", mesh=item.name)
+        if key is not None:
+            yield told("{mesh} has shape keys of its own that are in use.", mesh=item.name)
         return
     others = (b for b in key.key_blocks if b not in (block, key.reference_key))
     used = [b for b in others if b.value and not b.mute]
