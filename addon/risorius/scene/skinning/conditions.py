@@ -329,9 +329,10 @@ def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
     modes = np.empty(len(rig.pose.bones), np.int32)
     rig.pose.bones.foreach_get("rotation_mode", modes)
     for place in np.flatnonzero(modes != 0).tolist():
-        bone = rig.pose.bones[place]
-        if saved.whole(bone.bone, parts.JOINT, -1) in live.owned:
-            return bone.name
+        name = rig.pose.bones[place].name
+        rest = bones.get(name)  # by name: after undo PoseBone.bone may point into freed memory
+        if rest is not None and saved.whole(rest, parts.JOINT, -1) in live.owned:
+            return name
     return ""
 
 
