@@ -324,6 +324,9 @@ def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
     bones.foreach_get("bbone_segments", segments)
     bones.foreach_get("inherit_scale", scales)
     wrong |= (segments != 1) | (scales != 0)
+    rests = np.empty((count, 16), np.float32)
+    bones.foreach_get("matrix_local", rests.ravel())
+    wrong |= ~np.isfinite(rests).all(axis=1)  # of joints too far away for float32
     if wrong.any():
         return bones[int(np.argmax(wrong))].name
     modes = np.empty(len(rig.pose.bones), np.int32)
