@@ -18,12 +18,6 @@ SEED = 20261121
 QUICK = {"shape_mode": "LIVE", "use_materials": False}
 
 
-@pytest.fixture(params=["AUTO", "KEYS"])
-def mode(request):
-    """The default, and real keys."""
-    return request.param
-
-
 def _one_sentence(text, path):
     """What is said names the file, in one printable sentence."""
     assert "Traceback" not in text, text
