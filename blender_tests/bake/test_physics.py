@@ -15,6 +15,12 @@ HANDLERS = (
 )
 
 
+@pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
+def mode(request):
+    """Direct mode, a live key and real keys, both on posed bones."""
+    return request.param
+
+
 def _has_maps_of_the_frame(rig, item):
     """The material of a simulated mesh, which carries the maps, reads those of each frame."""
     assert "maps" in item

@@ -21,6 +21,12 @@ ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "tests" / "data" / "golden"
 
 
+@pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
+def mode(request):
+    """Direct mode, a live key and real keys, both on posed bones."""
+    return request.param
+
+
 def _load_rig_oracle():
     """By path, since it is not of this folder and `oracle` is taken."""
     place = ROOT / "tests" / "python" / "support" / "oracle.py"

@@ -8,6 +8,12 @@ from support import scene
 from support.faces import CONTROLS, small_face
 
 
+@pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
+def mode(request):
+    """Direct mode, a live key and real keys, both on posed bones."""
+    return request.param
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_vertices_equal_the_oracle_for_random_controls(mode, dna_file, seed):
     rig = scene.load(dna_file, mode)

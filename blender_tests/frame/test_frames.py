@@ -11,6 +11,12 @@ from support.animation import animate
 FRAMES = (1, 4, 7, 10)
 
 
+@pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
+def mode(request):
+    """Direct mode, a live key and real keys, both on posed bones."""
+    return request.param
+
+
 def _play(rig, frames):
     found = {}
     for frame in frames:

@@ -32,6 +32,30 @@ def test_all_drivers_are_valid_after_import(mode, dna_file):
     _moves_and_is_right(_posed(dna_file, mode), dna_file)
 
 
+def _same(found, wanted, mode):
+    """Out of Direct mode Blender adds the bones up, which differs in the last bits."""
+    near = 1e-6 if mode == "AUTO" else 0.0
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=near)
+
+
+def test_what_is_saved_right_after_undo_is_the_undone(mode, dna_file, tmp_path):
+    bpy.context.preferences.edit.use_global_undo = True
+    rig = scene.load(dna_file, mode)
+    scene.set_controls(rig, jawOpen=0.8)
+    bpy.context.view_layer.update()
+    before = scene.snapshot(rig)
+    bpy.ops.ed.undo_push(message="open")
+    scene.set_controls(rig, jawOpen=0.2, browDownL=1.0)
+    bpy.ops.ed.undo_push(message="changed")
+    bpy.ops.ed.undo()
+    blend = str(tmp_path / "undone.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=blend)
+    addon_utils.disable(scene.MODULE)
+    bpy.ops.wm.open_mainfile(filepath=blend)
+    _same(scene.snapshot(_rig()), before, mode)
+    addon_utils.enable(scene.MODULE)
+
+
 def test_save_and_reload_with_the_source_gone(mode, dna_file, tmp_path):
     content = dna_file.read_bytes()
     rig = _posed(dna_file, mode)
@@ -40,8 +64,7 @@ def test_save_and_reload_with_the_source_gone(mode, dna_file, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     dna_file.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    near = 1e-6 if mode == "AUTO" else 0.0  # the file has posed bones, which Blender adds up
-    np.testing.assert_allclose(scene.snapshot(_rig()), before, rtol=0, atol=near)
+    _same(scene.snapshot(_rig()), before, mode)
     again = tmp_path / "again.dna"
     again.write_bytes(content)
     _moves_and_is_right(_rig(), again)
@@ -152,7 +175,7 @@ def test_disable_and_enable(mode, dna_file):
     rig = _posed(dna_file, mode)
     before = scene.snapshot(rig)
     addon_utils.disable(scene.MODULE)
-    np.testing.assert_array_equal(scene.snapshot(rig), before)
+    _same(scene.snapshot(rig), before, mode)
     scene.set_controls(rig, jawOpen=0.1)
     bpy.context.scene.frame_set(3)
     addon_utils.enable(scene.MODULE)

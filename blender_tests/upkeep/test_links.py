@@ -10,12 +10,6 @@ from support.layout import Recorder
 JAW = "CTRL_expressions.jawOpen"
 
 
-@pytest.fixture(params=["AUTO", "KEYS"])
-def mode(request):
-    """A linked character is never Direct, so AUTO stands for LIVE, too."""
-    return request.param
-
-
 @pytest.fixture
 def library(dna_file, tmp_path, mode):
     """A .blend with a posed character in collection `Small`; the open file is empty."""

@@ -327,14 +327,18 @@ def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
     bones.foreach_get("bbone_segments", segments)
     bones.foreach_get("inherit_scale", scales)
     wrong |= (segments != 1) | (scales != 0)
+    rests = np.empty((count, 16), np.float32)
+    bones.foreach_get("matrix_local", rests.ravel())
+    wrong |= ~np.isfinite(rests).all(axis=1)  # of joints too far away for float32
     if wrong.any():
         return bones[int(np.argmax(wrong))].name
     modes = np.empty(len(rig.pose.bones), np.int32)
     rig.pose.bones.foreach_get("rotation_mode", modes)
     for place in np.flatnonzero(modes != 0).tolist():
-        bone = rig.pose.bones[place]
-        if saved.whole(bone.bone, parts.JOINT, -1) in live.owned:
-            return bone.name
+        name = rig.pose.bones[place].name
+        rest = bones.get(name)  # by name: after undo PoseBone.bone may point into freed memory
+        if rest is not None and saved.whole(rest, parts.JOINT, -1) in live.owned:
+            return name
     return ""
 
 

@@ -43,6 +43,7 @@ def leave(rig: ArmatureObject) -> None:
         return
     if frame is not None:
         bone_writer.write(rig, frame.live, frame.shape.joints, frame.shape.turns, None)
+        rig.update_tag(refresh={"OBJECT"})
     for item in found:
         direct.give_back(item, rig)
         block, key = meshes.live_block(item), item.data.shape_keys
