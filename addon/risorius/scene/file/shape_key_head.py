@@ -91,7 +91,13 @@ def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int
 
 
 def rig_task(
-    shapes: native.ShapeSet, path: str, joints: int, levels: int, tolerance_mm: float | None
+    shapes: native.ShapeSet,
+    path: str,
+    joints: int,
+    levels: int,
+    tolerance_mm: float | None = None,
+    *,
+    keep: bool = True,
 ) -> Task[tuple[native.JointRig, list[str]]]:
     """The making of a joint rig, which ends with the file; a cancelled one leaves none.
 
@@ -100,7 +106,8 @@ def rig_task(
         path: of the DNA file.
         joints: new ones.
         levels: of detail.
-        tolerance_mm: what blend shapes keep; None: joints alone.
+        tolerance_mm: blend shapes keep what joints leave beyond it; None: a share of the height.
+        keep: whether there are blend shapes; False: joints alone.
 
     Returns:
         A task whose result is risorius.author.JointRig and what is odd, a sentence each.
@@ -119,6 +126,7 @@ def rig_task(
         options = author.RigOptions(
             author.FitOptions(joints=joints),
             tolerance_mm,
+            shapes=keep,
             lods=author.LodOptions(count=levels),
         )
         rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
