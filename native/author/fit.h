@@ -50,9 +50,10 @@ struct FitOptions {
   /// A joint takes no part in an expression in which it moves no vertex so far, in the shapes'
   /// unit; the others then take over what it did. 0: all joints take part in all.
   double least_effect = 0.0;
-  /// Of the second half of the rounds the one is kept whose largest error is the smallest.
+  /// Of the last four rounds the one is kept whose largest error is the smallest; bound: of the
+  /// second half of the rounds.
   bool bound = false;
-  std::size_t rounds = 20;  // of weights and motions after all joints are there
+  std::size_t rounds = 40;  // of weights and motions after all joints are there
   std::size_t threads = 0;  // 0: all cores; the result does not depend on it
   std::vector<GivenJoint> given;
   std::vector<Pivot> pivots;

@@ -235,7 +235,7 @@ TEST(Fit, JointsLeaveExpressionsInWhichTheyDoLittleAndOthersTakeOver) {
   EXPECT_GT(small, 3u);
   EXPECT_GE(resting, small);
   EXPECT_LT(largest_error(shapes, *few_each), 0.7 * largest_error(shapes, cut));
-  EXPECT_LT(largest_error(shapes, *few_each), 1.5 * largest_error(shapes, *all));
+  EXPECT_LT(largest_error(shapes, *few_each), 0.8 * least);
 }
 
 TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
@@ -250,7 +250,8 @@ TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
     options.bound = true;
     auto best = fit_joints(shapes, options);
     ASSERT_TRUE(last && best);
-    EXPECT_LE(largest_error(shapes, *best), 1.001 * largest_error(shapes, *last)) << rounds;
+    // The fit looks at the mirror of the third expression as well.
+    EXPECT_LE(largest_error(shapes, *best), 1.1 * largest_error(shapes, *last)) << rounds;
     any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
   }
   EXPECT_TRUE(any);

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Fits of joints to the CC0 head's 52 expressions, beside Dem Bones where it is installed.
 
-python tests/bench/author_fit.py --joints 40 120 400 [--rival] [--bound]
+python tests/bench/author_fit.py --joints 40 120 400 [--rival] [--bound] [--heads HEAD ...]
 The rival is EA's own code: pip install py-dem-bones==0.13.1. Both get the same mesh, joints and
-influences; the seconds are wall and CPU.
+influences; the seconds are wall and CPU. Heads are cc0, those of MACROS, which no sample person has
+(the units of the data as they are, on another form), and the path of ICT FaceKit's head as an .npz.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import platform
 import time
@@ -19,12 +21,18 @@ import numpy as np
 from risorius.author import FitOptions, fit_joints
 from risorius.author.fitting import bounded
 from risorius.author.geometry.skeleton import matrices_of_vectors
-from risorius_people.source import FACE_UNITS, Source, fetch
+from risorius_people.source import FACE_UNITS, TARGETS, Source, fetch
 
 HEAD_MM = 240
+MACROS = {
+    "baby": ("universal-male-baby-averagemuscle-maxweight", "african-male-baby"),
+    "small": ("universal-female-baby-minmuscle-minweight", "asian-female-baby"),
+    "strong": ("universal-male-child-maxmuscle-maxweight", "african-male-child"),
+    "old": ("universal-female-old-minmuscle-minweight", "asian-female-old"),
+}
 
 
-def head(path):
+def head(path, macros=()):
     """Positions, displacements [E, V, 3] and polygons of the head, in decimetres."""
     source = Source(path)
     base = source.base_mesh()
@@ -39,7 +47,26 @@ def head(path):
     place = np.full(len(base.positions), -1)
     place[kept] = np.arange(len(kept))
     moved = np.stack([source.face_unit(n, len(base.positions))[kept] for n in units])
-    return base.positions[kept], moved, [place[face] for face in high]
+    form = base.positions.copy()
+    for name in macros:
+        form += source.target(f"{TARGETS}macrodetails/{name}.target.gz", len(form))
+    return form[kept], moved, [place[face] for face in high]
+
+
+def ict(path):
+    """As head, of ICT FaceKit's head with mouth, teeth and eyes."""
+    with np.load(path) as data:
+        neutral, begin = data["neutral"].astype(float), data["expression_begin"]
+        moved = np.zeros((len(begin) - 1, *neutral.shape))
+        for e, (first, last) in enumerate(itertools.pairwise(begin)):
+            moved[e, data["expression_vertex"][first:last]] = data["expression_delta"][first:last]
+        return neutral, moved, [face[face >= 0] for face in data["faces"]]
+
+
+def load(name):
+    if Path(name).suffix == ".npz":
+        return ict(name)
+    return head(fetch(), MACROS.get(name, ()))
 
 
 def edges_of(faces):
@@ -130,12 +157,20 @@ def main():
     parser.add_argument("--joints", type=int, nargs="+", default=[40, 120])
     parser.add_argument("--rival", action="store_true")
     parser.add_argument("--bound", action="store_true", help="as risorius author --bound")
+    parser.add_argument(
+        "--heads", nargs="+", default=["cc0"], help=f"cc0, {', '.join(MACROS)}, .npz"
+    )
     args = parser.parse_args()
-    positions, moved, faces = head(fetch())
+    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores")
+    for name in args.heads:
+        measure(name, args)
+
+
+def measure(name, args):
+    positions, moved, faces = load(name)
     edges = edges_of(faces)
     motion = np.sqrt((moved**2).sum(axis=2).mean()) / np.ptp(positions[:, 1])
-    print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores")
-    print(f"{len(positions)} vertices, {len(moved)} expressions, motion {motion:.2%} RMS")
+    print(f"{name}: {len(positions)} vertices, {len(moved)} expressions, motion {motion:.2%} RMS")
     titles = ["RMS %", "of moving", "mean mm", "largest mm", "roughness", "wall s", "CPU s"]
     widths = [8, 10, 8, 10, 9, 7, 7]
     line = " ".join(f"{t:>{w}}" for t, w in zip(titles, widths, strict=True))

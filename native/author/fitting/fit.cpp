@@ -26,9 +26,10 @@ constexpr int kRoundsOfWeights = 12;
 constexpr std::size_t kRoundsOfMotions = 8;  // of Gauss and Newton
 // Joints leave an expression step by step: the others have taken over before the next ones go.
 constexpr double kThinning[] = {0.5, 1.0};
-/// Joints lie amid what they move until the last rounds: from a far pivot they turn on their own
-/// worse.
-constexpr std::size_t kRoundsAtPivots = 4;
+/// The last rounds: joints lie at their pivots (before, they lie amid what they move: from a far
+/// pivot they turn on their own worse), and what momentum overshoots is evened out.
+constexpr std::size_t kLastRounds = 4;
+constexpr double kMomentum = 0.6;
 /// Joints that stay where they are: those that a vertex needs may lie further off than its
 /// neighbours'.
 constexpr std::size_t kNearOfGiven = 12;
@@ -123,6 +124,13 @@ void improve(const Problem& problem, State& state, std::vector<float>& left) {
   detail::find_residual(problem, state, left);
 }
 
+/// What is left, squared, all vertices alike.
+double squares(const std::vector<float>& left) {
+  double sum = 0.0;
+  for (const float x : left) sum += double{x} * double{x};
+  return sum;
+}
+
 /// What a round would end at, kept where its largest error is the smallest so far.
 struct Best {
   std::optional<State> state;
@@ -198,15 +206,21 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
     }
   }
   Best best;
+  double before = squares(left);
   for (std::size_t r = 0; r < options.rounds; ++r) {
-    problem.to_pivots =
-        r + kRoundsAtPivots >= options.rounds || (options.bound && 2 * r >= options.rounds);
+    const bool last = r + kLastRounds >= options.rounds;
+    problem.to_pivots = last || (options.bound && 2 * r >= options.rounds);
+    problem.momentum = last ? 0.0 : kMomentum;
     improve(problem, state, left);
-    if (options.bound && problem.to_pivots) best.take(problem, state, left);
+    if (problem.to_pivots) best.take(problem, state, left);
     // The last two rounds even out what the new importance asked for.
     if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);
+    const double now = squares(left);
+    if (now > before) state.solved.clear();  // momentum leads astray: it begins anew
+    before = now;
     if (!steps.go_on()) return stopped();
   }
+  problem.momentum = 0.0;
   if (best.state) {
     state = std::move(*best.state);
   } else {

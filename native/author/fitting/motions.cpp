@@ -22,9 +22,11 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 constexpr std::size_t kRanges = 16;
 constexpr double kFar = 0.25;  // radians from which on arms count as turned
 // Ridges, shares of the joints' mean stiffness: what keeps joints that share vertices from turning
-// against each other. Tried from 1e-4 to 10 on a head with 52 expressions.
-constexpr double kTurn = 0.1;
+// against each other. Tried from 1e-4 to 10 on a head with 52 expressions, and on four others.
+constexpr double kTurn = 0.03;
 constexpr double kShift = 3e-3;
+// Of the energy of a step; ten thousand times as much led rounds astray.
+constexpr double kEnough = 1e-6;
 constexpr double kTurnAtPivot = 0.01;  // there a shift is the stranger one
 constexpr double kShiftAtPivot = 0.01;
 
@@ -407,7 +409,7 @@ Eigen::VectorXd solve_turned(const State& state, const System& system, std::size
   Eigen::VectorXd x = Eigen::VectorXd::Zero(right.size()), left = right;
   Eigen::VectorXd z = near_inverse(left), direction = z;
   double energy = left.dot(z);
-  const double enough = 1e-6 * energy;
+  const double enough = kEnough * energy;
   for (int step = 0; step < 40 && energy > enough; ++step) {
     const Eigen::VectorXd pushed = matrix.selfadjointView<Eigen::Lower>() * direction;
     const double length = energy / direction.dot(pushed);

@@ -36,6 +36,9 @@ struct Problem {
   std::vector<Pivot> pivots;
   bool to_pivots = false;  // whether joints are placed there already
   double smoothness = 0.0;
+  /// What weights changed by goes on by this share: rounds that follow each other mostly go one
+  /// way.
+  double momentum = 0.0;
   std::size_t near = 5;            // joints that a vertex tries because they are near
   std::vector<double> importance;  // [V] of a vertex' squared error, mean 1
   std::vector<double> asked;       // [V] of it, what the caller asked for
@@ -71,9 +74,10 @@ struct Influence {
 struct State {
   std::vector<Joint> joints;
   std::vector<std::vector<Influence>> weights;  // [V] by joint's number
+  std::vector<std::vector<Influence>> solved;   // [V] what they were before they went on; or empty
 };
 
-/// Best weights for the motions that there are.
+/// Best weights for the motions that there are; with momentum, ahead of them.
 void solve_weights(const Problem& problem, State& state);
 /// Best motions for the weights that there are.
 /// In: left  what remains of the displacements, see find_residual

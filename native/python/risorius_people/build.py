@@ -22,6 +22,7 @@ from risorius.author.correctives import (
     find_correctives,
 )
 from risorius.author.levels import level_name
+from risorius.author.lighter import within_deltas
 from risorius.base import blas
 from risorius.files import fileio
 
@@ -46,10 +47,8 @@ _FIT_BEGINS = 0.2  # of the whole time
 _SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
 _AGAIN_BEGINS = 0.75
-TOLERANCE_MM = 0.2  # what joints leave beyond it stays in blend shapes
 RIG = RigOptions(
     FitOptions(joints=NEW_JOINTS),
-    tolerance_mm=TOLERANCE_MM,
     kept=("eyeLeft", "eyeRight"),
     between=False,
 )
@@ -276,7 +275,7 @@ class _Making:
     @property
     def corrects_again(self) -> bool:
         """Whether correctives were found, and shapes keep what the joints cannot do."""
-        return self.found and self.rig is not None and self.rig.tolerance_mm is not None
+        return self.found and self.rig is not None and self.rig.shapes
 
 
 def _assemble(making: _Making) -> None:
@@ -334,6 +333,7 @@ def _correct_again(making: _Making) -> None:
     making.steps.at(_AGAIN_BEGINS, "looking once more at what joints and shapes do together")
     tell = making.steps.share_of(_AGAIN_BEGINS, 1.0)
     making.dna = correct_again(making.dna, making.shapes, making.correctives, tell)
+    making.dna = within_deltas(making.dna, making.shapes).dna
 
 
 def _make_askew(making: _Making) -> None:

@@ -34,7 +34,7 @@ from risorius.author.geometry.simplify import (
 )
 from risorius.author.input import matching, shape_face, spec
 from risorius.author.level_meshes import level_meshes, shape_of
-from risorius.author.work import begin
+from risorius.author.work import TOLERANCE, begin
 from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
@@ -65,6 +65,11 @@ def made(folder):
     )
     assert done.returncode == 0, done.stderr
     return risorius.load(folder / "egg.dna"), done.stdout
+
+
+def tolerated(times=1.0):
+    """How far a vertex may be off by default, cm: a share of the head's height."""
+    return times * TOLERANCE * np.ptp(face_shapes.head()[0][:, 1])
 
 
 def posed(dna, controls):
@@ -99,7 +104,7 @@ def test_a_control_at_1_is_the_expression(made, name):
     dna, _ = made
     goal = wanted(dna, face_shapes.expressions(face_shapes.head()[0])[name])
     error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - goal, axis=1)
-    assert error.max() * 1000 < 0.0505  # mm: the default tolerance, and rounding
+    assert error.max() / METRES < tolerated(1.01)  # and rounding
 
 
 def test_the_file_is_sound_and_says_what_moves(made):
@@ -127,7 +132,7 @@ def test_another_reader_gets_the_same_expression(read, name):
     positions, _ = face_shapes.head()
     delta = face_shapes.expressions(positions)[name]
     error = np.linalg.norm(read.vertices(raw(name)) - positions - delta, axis=1)
-    assert 10 * error.max() < 0.0505  # mm
+    assert error.max() < tolerated(1.01)
 
 
 def test_eight_levels_by_another_reader(read, made):
@@ -363,7 +368,8 @@ def test_without_room_for_the_page_there_is_no_face_either(folder, tmp_path, mon
     out.write_text("old")
     page.write_text("old too")
     made = SimpleNamespace(dna=risorius.load(GOLDEN / "core.dna"))
-    monkeypatch.setattr(author, "as_lines", lambda *_given: [])
+    for name, said in (("as_lines", []), ("as_trade", ""), ("lighten", None)):
+        monkeypatch.setattr(author, name, lambda *_given, said=said: said)
     monkeypatch.setattr(author, "make_joint_rig", lambda *_given: made)
     monkeypatch.setattr(author, "report_page", lambda *_given: b"x" * 1_000_000)
     command = ["author", str(folder / "spec.toml"), "-o", str(out)]
@@ -461,7 +467,7 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
     # Where 200 rounds end differs by what a compiler rounds.
     assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
-    assert (more.rounds, more.emphasis, more.bound) == (300, 5.0, True)
+    assert (more.rounds, more.emphasis, more.bound) == (300, 3.0, True)
 
 
 def test_joints_that_are_there_stay(folder):
@@ -505,7 +511,7 @@ def test_joints_that_are_there_stay(folder):
     assert kept[0].values[at] == pytest.approx(np.degrees(0.3))
     for name, goal in before.items():
         error = np.linalg.norm(posed(rig.dna, {name: 1}) - goal, axis=1)
-        assert error.max() * 1000 < 0.0505
+        assert error.max() / METRES < tolerated(1.01)
 
 
 def test_what_goes_with_a_jaw_is_its_child(folder):
@@ -543,7 +549,7 @@ def test_what_goes_with_a_jaw_is_its_child(folder):
     mesh.blend_shape_targets = kept
     dna.meshes = [mesh]
     levels = LodOptions(count=1)
-    options = RigOptions(FitOptions(joints=40), None, least_effect_mm=0.0, lods=levels)
+    options = RigOptions(FitOptions(joints=40), shapes=False, least_effect_mm=0.0, lods=levels)
     made = make_joint_rig(dna, options).dna
     assert list(made.joint_parents).count(2) >= 3
     for controls, most in (
@@ -570,7 +576,7 @@ def test_joints_of_a_pair_are_named_alike(made):
 
 def test_half_the_way_of_an_arc_is_no_worse_than_its_end(folder):
     dna = spec.read_face(spec.read_spec(folder / "spec.toml")).dna
-    options = RigOptions(FitOptions(joints=40), tolerance_mm=None, lods=LodOptions(count=1))
+    options = RigOptions(FitOptions(joints=40), shapes=False, lods=LodOptions(count=1))
     (errors,) = make_joint_rig(dna, options).errors
     for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"):
         at = errors.expressions.index("CTRL_expressions." + name)
@@ -602,7 +608,7 @@ def test_a_coarser_mesh_hangs_on_the_same_joints(folder):
     channels = dna.blend_shape_channels
     channels.lods = [7, 7]
     dna.blend_shape_channels = channels
-    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=40), tolerance_mm=None)).dna
+    rig = make_joint_rig(dna, RigOptions(FitOptions(joints=40), shapes=False)).dna
     two = RigOptions(FitOptions(9), lods=LodOptions(count=2))
     assert [(e.name, e.lod) for e in make_joint_rig(dna, two).errors] == [
         ("fine", 0),

@@ -62,19 +62,21 @@ CONTROLS = {
 
 @pytest.mark.parametrize("name", CONTROLS)
 def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
-    _, face, _ = egg
+    _, face, said = egg
     positions, _ = face_shapes.head()
     goal = positions + sculpts(positions)[name]
     error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
-    assert 10 * error.max() < 0.06  # mm: the default tolerance, and rounding
+    # Of each expression and corrective that is at work, and rounding.
+    parts = len(CONTROLS[name]) + (1 if name == SCULPT else 2)
+    assert 10 * error.max() < 1.02 * said["tolerance"]["mm"] * parts
 
 
 def test_single_expressions_stay_what_they_are(egg):
-    _, face, _ = egg
+    _, face, said = egg
     positions, _ = face_shapes.head()
     delta = face_shapes.expressions(positions)["jawOpen"]
     error = np.linalg.norm(face.vertices(at_one("jawOpen")) - positions - delta, axis=1)
-    assert 10 * error.max() < 0.0505
+    assert 10 * error.max() < 1.01 * said["tolerance"]["mm"]
 
 
 def test_joints_do_most_of_it_and_the_command_says_so(egg):
@@ -86,7 +88,7 @@ def test_joints_do_most_of_it_and_the_command_says_so(egg):
     ]
     for row in rows.values():
         assert row["joints_largest_mm"] < 0.25 * row["without_mm"]
-        assert row["largest_mm"] <= 0.0505
+        assert row["largest_mm"] <= 1.01 * said["tolerance"]["mm"]
     dna = risorius.load(folder / "egg.dna")
     inputs = {int(i) for group in dna.joint_groups for i in group.input_indices}
     assert len(dna.raw_control_names) in inputs  # the first corrective moves joints

@@ -26,7 +26,7 @@ _SPEC = importlib.util.spec_from_file_location("blender_oracle_like", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
 _SPEC.loader.exec_module(oracle)
 
-OPTIONS = RigOptions(FitOptions(joints=24, rounds=6), lods=LodOptions(count=4))
+OPTIONS = RigOptions(FitOptions(joints=24, rounds=6), 0.05, lighter=False, lods=LodOptions(count=4))
 
 
 def other_person(dna):

@@ -168,7 +168,9 @@ def rig_task(
     path: str,
     joints: int,
     levels: int,
-    tolerance_mm: float | None,
+    tolerance_mm: float | None = None,
+    *,
+    keep: bool = True,
     said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[tuple[native.JointRig, list[str]]]:
     """The making of a joint rig, which ends with the file; a cancelled one leaves none.
@@ -178,7 +180,8 @@ def rig_task(
         path: of the DNA file.
         joints: new ones.
         levels: of detail.
-        tolerance_mm: what blend shapes keep; None: joints alone.
+        tolerance_mm: blend shapes keep what joints leave beyond it; None: a share of the height.
+        keep: whether there are blend shapes; False: joints alone.
         said: what the user said that keys are, as risorius.author.input.said.
 
     Returns:
@@ -198,6 +201,7 @@ def rig_task(
         options = author.RigOptions(
             author.FitOptions(joints=joints),
             tolerance_mm,
+            shapes=keep,
             lods=author.LodOptions(count=levels),
             kept=shapes.kept,
         )

@@ -50,8 +50,9 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Millimetres that joints may be off before a blend shape helps",
-        default=0.1,
+        description="Millimetres that joints may be off before a blend shape helps; 0: a share of "
+        "the head's height. Where more shapes would be kept than the head has, it is raised",
+        default=0.0,
         min=0.0,
         max=10.0,
     )
@@ -98,9 +99,14 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
             self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
         self._head, self._shapes = item.name, shapes
-        tolerance = self.tolerance if self.use_shapes else None
         task = shape_key_head.rig_task(
-            shapes, self.filepath, self.joints, self.levels, tolerance, said
+            shapes,
+            self.filepath,
+            self.joints,
+            self.levels,
+            self.tolerance or None,
+            keep=self.use_shapes,
+            said=said,
         )
         self._task = task
         return self.begin(context, task)
@@ -134,8 +140,10 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         self.report(
             {"INFO"},
             words.say(
-                "{count} joints; no vertex is further off than {mm} mm",
+                "{count} joints; deltas {before} -> {after}; no vertex further off than {mm} mm",
                 count=len(rig.new_joints),
+                before=rig.deltas_before,
+                after=rig.deltas_after,
                 mm=f"{largest:.2f}",
             ),
         )

@@ -41,6 +41,7 @@ class Combination:
     before: float  # largest, by joints without the corrective
     joints_largest: float
     largest: float  # with blend shapes
+    column: int = -1  # its input
 
 
 class _Side:
@@ -257,7 +258,7 @@ class Combinations:
             int(c): int(o)
             for c, o in zip(channels.input_indices, channels.output_indices, strict=True)
         }
-        out = [Combination(self._name(c), 0.0, 0.0, 0.0) for c in self.order]
+        out = [Combination(self._name(c), 0.0, 0.0, 0.0, c) for c in self.order]
         done: set[str] = set()
         meshes = list(work.dna.meshes)
         for lod in range(lods):
@@ -298,7 +299,7 @@ class Combinations:
             plain = goal - skin.made(shaped, without)
             found.before = max(found.before, float(np.linalg.norm(plain, axis=1).max()) * self.mm)
             found.joints_largest = max(found.joints_largest, float(error.max()))
-        tolerance = self.options.tolerance_mm
+        tolerance = (self.options.tolerance_mm or 0.0) if self.options.shapes else None
         moved = np.flatnonzero(error > (np.inf if tolerance is None else tolerance))
         if found is not None:
             rest = np.delete(error, moved)

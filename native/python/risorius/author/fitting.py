@@ -29,18 +29,19 @@ class FitOptions:
     influences: int = 8  # joints of a vertex at most
     smoothness: float = 1.0  # 0: only the error counts; 1: as smooth as Dem Bones' default
     emphasis: float = 3.0  # how far the largest error is fought; 0: least squares alone
-    rounds: int = 20
+    rounds: int = 40
     symmetric: bool = True  # where the mesh is
     threads: int = 0  # 0: all cores; the result does not depend on it
     # A joint takes no part in an expression in which it moves no vertex so far, in the mesh' unit.
     least_effect: float = 0.0
-    bound: bool = False  # of the second half of the rounds, that with the smallest largest error
+    # Of the second half of the rounds the one is kept whose largest error is the smallest; else of
+    # the last four.
+    bound: bool = False
 
 
 def bounded(options: FitOptions) -> FitOptions:
     """The same, with the largest error fought for several times as long."""
-    rounds, emphasis = max(options.rounds, 200), max(options.emphasis, 5.0)
-    return replace(options, rounds=rounds, emphasis=emphasis, bound=True)
+    return replace(options, rounds=max(options.rounds, 200), bound=True)
 
 
 def split_motions(motions: Doubles, positions: Doubles) -> tuple[Doubles, Doubles]:

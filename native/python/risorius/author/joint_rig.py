@@ -21,7 +21,8 @@ from .geometry import skeleton as sk
 from .geometry.skeleton import Doubles
 from .level_meshes import LevelMeshes, level_meshes
 from .levels import LodOptions, extend_levels, joint_budgets, joint_order, level_joints
-from .meshes import Made, count_deltas
+from .lighter import Lightened, deltas_of, within_deltas
+from .meshes import Made, channels_of
 from .naming import joint_names
 from .parents import choose_parents, joint_motions, room_for_second, second_joints
 from .pivots import Pivot, find_pivots
@@ -56,8 +57,10 @@ class JointRig:
     errors: list[MeshErrors]  # of the meshes of all levels
     levels: list[Level]
     height_mm: float  # of the largest mesh
-    deltas_before: int  # vertices times targets
+    deltas_before: int  # vertices times targets, at LOD 0
     deltas_after: int
+    tolerance_mm: float | None  # beyond which blend shapes keep what joints leave; None: none do
+    raised: bool  # whether it is more than what was asked for: the deltas of the input were used up
     columns: list[int]  # the input of each expression
     combinations: list[Combination]  # correctives
     reference: Reference  # what other people's faces take over
@@ -92,19 +95,62 @@ def make_joint_rig(
     names = list(work.dna.joint_names)[len(dna.joint_names) :]
     combinations = _combine(work, made.options, regions, _part(progress, 0.8, 1.0))
     made.meshes = list(work.dna.meshes)
-    return JointRig(
+    rig = JointRig(
         work.dna,
         names,
         made.errors,
         made.levels(),
-        _height(dna) * MM.get(dna.translation_unit, 10.0),
-        count_deltas(dna.meshes),
-        count_deltas(work.dna.meshes),
+        height_mm(dna),
+        deltas_of(dna),
+        deltas_of(work.dna),
+        made.options.tolerance_mm if made.options.shapes else None,
+        False,
         work.columns,
         combinations,
         reference_of(work, fit, made),
         made.coarse.ended,
     )
+    if made.options.lighter:
+        lighten(rig, dna)
+    return rig
+
+
+def lighten(rig: JointRig, source: Dna) -> None:
+    """Leave out what makes a rig heavier than its input, and say in it what that costs.
+
+    Args:
+        rig: of joints; it is changed.
+        source: the face of shapes that it is measured by.
+    """
+    found = within_deltas(rig.dna, source)
+    rig.dna, rig.deltas_before, rig.deltas_after = found.dna, found.before, found.after
+    if rig.tolerance_mm is not None and found.shortest_mm > rig.tolerance_mm:
+        rig.tolerance_mm, rig.raised = found.shortest_mm, True
+    _take_errors(rig, found)
+
+
+def _take_errors(rig: JointRig, found: Lightened) -> None:
+    """What is off without the deltas that were left out, into the errors of a rig."""
+    dna, channels = rig.dna, channels_of(rig.dna)
+    for errors in rig.errors:
+        for row, column in enumerate(rig.columns):
+            off = found.dropped.get((errors.name, channels.get(column, -1)), 0.0)
+            errors.largest[row] = max(errors.largest[row], off)
+    finest = [dna.mesh_names[m] for m in listed_meshes(dna, 0)]
+    for combination in rig.combinations:
+        channel = channels.get(combination.column, -1)
+        off = max((found.dropped.get((name, channel), 0.0) for name in finest), default=0.0)
+        combination.largest = max(combination.largest, off)
+    for lod, level in enumerate(rig.levels):
+        names = {dna.mesh_names[m] for m in listed_meshes(dna, lod)}
+        level.deltas = deltas_of(dna, lod)
+        largest = [float(e.largest.max()) for e in rig.errors if e.name in names]
+        level.largest_with_shapes = max(largest, default=0.0)
+
+
+def height_mm(dna: Dna) -> float:
+    """Of the head, as tolerances and errors are shares of it."""
+    return _height(dna) * MM.get(dna.translation_unit, 10.0)
 
 
 def _height(dna: Dna) -> float:
@@ -160,6 +206,8 @@ def _made(
         coarse = level_meshes(work, wanted, o.lods, coarse.count)
     work.levels = coarse.count
     o = replace(o, fit=replace(o.fit, least_effect=o.least_effect_mm / unit))
+    if o.tolerance_mm is None:
+        o = replace(o, tolerance_mm=o.tolerance * height_mm(dna))
     if like is None:
         # The fit is nearly all of the work; levels and weights take what is left of the bar.
         fit, weights = _new_joints(work, shaped, wanted, o, _part(progress, 0.0, 0.7))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +16,7 @@ from .geometry.skeleton import Doubles, Ints
 from .level_meshes import LevelMeshes
 from .level_weights import level_weights
 from .levels import level_name
+from .lighter import count_deltas
 from .reference import Reference
 from .work import (
     MM,
@@ -28,10 +28,6 @@ from .work import (
 )
 
 _LEAST_WEIGHT = 1e-3
-
-
-def count_deltas(meshes: Sequence[Mesh]) -> int:
-    return sum(len(t.vertex_indices) for mesh in meshes for t in mesh.blend_shape_targets)
 
 
 class Made:
@@ -158,7 +154,7 @@ class Made:
             _set_skin(made, rows)
             self.meshes.append(made)
             return
-        shaped = self.options if lod < self.own else replace(self.options, tolerance_mm=None)
+        shaped = self.options if lod < self.own else replace(self.options, shapes=False)
         made, left = _finish_mesh(self.ways, mesh, rows, wanted, shaped)
         left.name, left.lod = name, lod
         self.meshes.append(made)
@@ -189,9 +185,7 @@ class Made:
                 Level(
                     joints=len(self.work.new[lod]),
                     vertices=vertices,
-                    deltas=sum(
-                        len(t.vertex_indices) for x in meshes for t in x.blend_shape_targets
-                    ),
+                    deltas=count_deltas(meshes),
                     rms=float(np.sqrt(squares / count)),
                     largest=max((float(e.joints_largest.max()) for e in errors), default=0.0),
                     largest_with_shapes=max((float(e.largest.max()) for e in errors), default=0.0),
@@ -214,7 +208,7 @@ def _finish_mesh(
     weights = sk.dense_weights(out, rows.shape[1])
     positions = np.asarray(mesh.positions, np.float64)
     mm = MM.get(work.dna.translation_unit, 10.0)
-    channel = _channels(work.dna)
+    channel = channels_of(work.dna)
     between, skin = Between(ways, mesh), sk.Skin(positions, weights)
     found, targets = _no_errors(len(positions), work.names), []
     own = ways.whole[:, weights.any(axis=0)]
@@ -229,8 +223,8 @@ def _finish_mesh(
         found.motion[row] = np.sqrt((wanted[row] ** 2).sum(axis=1).mean()) * mm
         found.joints_rms[row] = np.sqrt((error**2).mean())
         found.joints_largest[row], found.worst_vertex[row] = error.max(), error.argmax()
-        if options.tolerance_mm is not None and column in channel:
-            moved = np.flatnonzero(error > options.tolerance_mm)
+        if options.shapes and column in channel:
+            moved = np.flatnonzero(error > (options.tolerance_mm or 0.0))
             if len(moved):
                 shaped = sk.before_skin(goal[moved], weights[moved], ways.whole[row])
                 targets.append(
@@ -246,7 +240,7 @@ def _finish_mesh(
     return out, found
 
 
-def _channels(dna: Dna) -> dict[int, int]:
+def channels_of(dna: Dna) -> dict[int, int]:
     """The blend shape channel of each input that drives one."""
     channels = dna.blend_shape_channels
     pairs = zip(channels.input_indices, channels.output_indices, strict=True)

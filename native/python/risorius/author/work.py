@@ -25,6 +25,9 @@ CARRIED_MM = 20.0
 # The most memory that making a rig may take: the dense table of all expressions is about a hundred
 # times as large as the deltas in the file.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 28, 128
+# Of the head's height: 0.16 mm of 240. The default of the command line, of Blender and of the
+# sample people.
+TOLERANCE = 1 / 1500
 _RIGID_MM = 0.02  # a mesh that its joints bring so near needs no others
 
 
@@ -33,8 +36,14 @@ class RigOptions:
     """What the joint rig is to be."""
 
     fit: FitOptions = field(default_factory=FitOptions)
-    # A blend shape keeps what joints leave of a vertex beyond this, in mm; None: no blend shapes.
-    tolerance_mm: float | None = 0.05
+    # A blend shape keeps what joints leave of a vertex beyond this, in mm; None: beyond
+    # `tolerance`, a share of the head's height.
+    tolerance_mm: float | None = None
+    tolerance: float = TOLERANCE
+    shapes: bool = True  # False: no blend shapes, joints alone
+    # Whether the rig has at most as many deltas as its input: what joints leave beyond the
+    # tolerance is then kept as far as these go.
+    lighter: bool = True
     # A joint leaves an expression in which it moves no vertex further: others take over.
     least_effect_mm: float = 0.05
     lods: LodOptions = field(default_factory=LodOptions)

@@ -18,7 +18,7 @@ from ..fitting import FitOptions
 from ..heads.joining import join
 from ..heads.parts import Material, Wishes
 from ..levels import LodOptions
-from ..work import RigOptions
+from ..work import TOLERANCE, RigOptions
 from . import fbx, gltf, said
 from .fbx_head import read_fbx_head
 from .gltf_head import read_gltf_head
@@ -57,7 +57,11 @@ _TABLES: dict[str, _Checks] = {
         "bound": flag,
         "least_effect_mm": partial(finite, low=0.0, high=1e6),
     },
-    "shapes": {"tolerance_mm": partial(finite, low=0.0, high=1e6), "keep": flag},
+    "shapes": {
+        "tolerance_mm": partial(finite, low=0.0, high=1e6),
+        "tolerance_percent": partial(finite, low=0.0, high=100.0),
+        "keep": flag,
+    },
     "correctives": {
         "most": partial(whole, low=0, high=65_535),
         "again": partial(whole, low=0, high=1_000_000),
@@ -189,7 +193,9 @@ def _options(path: Path, table: dict[str, Any]) -> RigOptions:
     named = {"joints" if k == "count" else k: v for k, v in table.get("joints", {}).items()}
     least = named.pop("least_effect_mm", RigOptions.least_effect_mm)
     shapes = table.get("shapes", {})
-    tolerance = shapes.get("tolerance_mm", 0.05) if shapes.get("keep", True) else None
+    if "tolerance_mm" in shapes and "tolerance_percent" in shapes:
+        raise ShapeFileError(f"{path}: shapes: tolerance_mm or tolerance_percent was expected")
+    share = shapes["tolerance_percent"] / 100 if "tolerance_percent" in shapes else TOLERANCE
     levels = dict(table.get("lods", {}))
     longest = max(len(levels.get(name, ())) for name in ("joints", "vertices"))
     if longest and "count" not in levels:
@@ -199,7 +205,14 @@ def _options(path: Path, table: dict[str, Any]) -> RigOptions:
         lods.check()
     except ValueError as error:
         raise ShapeFileError(f"{path}: {error}") from None
-    return RigOptions(FitOptions(**named), tolerance, least, lods)
+    return RigOptions(
+        FitOptions(**named),
+        shapes.get("tolerance_mm"),
+        share,
+        shapes=shapes.get("keep", True),
+        least_effect_mm=least,
+        lods=lods,
+    )
 
 
 def _correctives(table: dict[str, Any]) -> CorrectiveOptions:

@@ -26,8 +26,8 @@ from ...author.input import said as sayings
 from ...author.input.library import about_library, library_files, library_folder
 from ...author.input.matching import Assignment
 from ...author.input.spec import Spec, read_face, read_spec
-from ...author.joint_rig import JointRig, make_joint_rig
-from ...author.work import RigOptions
+from ...author.joint_rig import JointRig, lighten, make_joint_rig
+from ...author.work import TOLERANCE, RigOptions
 from ...base.words import counted
 from ...controls.vocabulary import vocabulary
 from ...files import fileio
@@ -59,7 +59,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--joints-only", action="store_true", help="no blend shapes, whatever the spec says"
     )
     parser.add_argument(
-        "--exact", action="store_true", help="blend shapes for all that joints leave"
+        "--exact",
+        action="store_true",
+        help="blend shapes for all that joints leave, also where these are heavier than the input",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=_tolerance,
+        metavar="N[mm|%]",
+        help="blend shapes keep what joints leave beyond it: in mm, or in %% of the head's height "
+        f"({100 * TOLERANCE:.2g}%% without it)",
     )
     parser.add_argument(
         "--bound",
@@ -131,24 +140,27 @@ def run(args: argparse.Namespace) -> int:
         dna = add_correctives(dna, found.skin, [(x.controls, x.shape) for x in found.correctives])
         say.line("\n".join(as_found(found)))
     rig = make_joint_rig(dna, options, say)
-    if dna is not source and options.tolerance_mm is not None and asked.once_more:
+    if dna is not source and options.shapes and asked.once_more:
         say.line("looking once more at what joints and shapes do together")
         rig.dna = correct_again(rig.dna, source, asked, say)
-    said = json.dumps(as_json(rig)) if args.json else "\n".join(as_lines(rig, args.out))
+    if options.lighter:
+        lighten(rig, source)  # what was found is no part of the input
     rig.dna.metadata = dict(rig.dna.metadata) | metadata_of(
         rig.dna.mesh_names, read.materials, textures
     )
     files = {args.out: rig.dna.to_bytes()}
     files |= library | textures.files
-    if not args.json:
-        more = [*about_library(became, library_folder(args.out)), *textures.notes]
-        said = "\n".join([said, *more])
-    else:
+    if args.json:
+        said = [json.dumps(as_json(rig))]
         print("\n".join(textures.notes), end="\n" if textures.notes else "", file=sys.stderr)
+    else:
+        about = about_library(became, library_folder(args.out))
+        trade = as_trade(rig, args.out, len(files[args.out]))
+        said = [*as_lines(rig), *about, *textures.notes, trade]
     if args.report is not None:
         files[args.report] = report_page(dna, rig, files[args.out], args.out.name)
     fileio.write_all(files)  # the page last of what can fail: there is no face without it
-    print(said)
+    print("\n".join(said))
     return 0
 
 
@@ -184,8 +196,15 @@ def _options(spec: Spec, args: argparse.Namespace) -> RigOptions:
     fit = replace(spec.options.fit, threads=args.threads)
     options = replace(spec.options, fit=bounded(fit) if args.bound else fit)
     if args.joints_only:
-        return replace(options, tolerance_mm=None)
-    return replace(options, tolerance_mm=0.0) if args.exact else options
+        return replace(options, shapes=False)
+    if args.exact:
+        return replace(options, tolerance_mm=0.0, lighter=False)
+    if args.tolerance is not None:
+        value, unit = args.tolerance
+        if unit == "%":
+            return replace(options, tolerance_mm=None, tolerance=value / 100)
+        return replace(options, tolerance_mm=value)
+    return options
 
 
 def _size(spec: Spec, args: argparse.Namespace) -> None:
@@ -204,6 +223,12 @@ def _correctives(spec: Spec, args: argparse.Namespace) -> CorrectiveOptions:
     if args.correctives is None:
         return out
     return replace(out, most=args.correctives)
+
+
+def _tolerance(text: str) -> tuple[float, str]:
+    """Millimetres, or a share in percent. Raises: ArgumentTypeError: neither."""
+    unit = "%" if text.endswith("%") else "mm"
+    return number(0.0, 100.0 if unit == "%" else 1e6)(text.removesuffix(unit).strip()), unit
 
 
 class _Clock:
@@ -268,6 +293,7 @@ def as_json(rig: JointRig) -> dict[str, object]:
             for c in rig.combinations
         ],
         "deltas": {"before": rig.deltas_before, "after": rig.deltas_after},
+        "tolerance": {"mm": rig.tolerance_mm, "raised": rig.raised},
         "meshes": [
             {
                 "name": m.name,
@@ -290,12 +316,11 @@ def as_json(rig: JointRig) -> dict[str, object]:
     }
 
 
-def as_lines(rig: JointRig, path: Path) -> list[str]:
+def as_lines(rig: JointRig) -> list[str]:
     """The errors of each mesh as lines of a table.
 
     Args:
         rig: what was made.
-        path: where it was written.
     """
     levels = (
         f"{'LOD':>3} {'joints':>7} {'vertices':>9} {'deltas':>9} {'RMS mm':>8} {'largest mm':>11}"
@@ -325,9 +350,27 @@ def as_lines(rig: JointRig, path: Path) -> list[str]:
             f"{off.joints_largest:.3f} mm ({off.name}), without them "
             f"{max(c.before for c in rig.combinations):.3f}"
         )
-    largest = rig.levels[0].largest_with_shapes
-    out.append(
-        f"{path}: {counted(len(rig.new_joints), 'new joint')}; with blend shapes at most "
-        f"{largest:.3f} mm, {rig.deltas_after:,} deltas instead of {rig.deltas_before:,}"
-    )
+    if rig.raised:
+        out.append(
+            f"note: blend shapes keep what joints leave beyond {rig.tolerance_mm:.3f} mm: more "
+            f"than the tolerance, so that there are no more deltas than the {rig.deltas_before:,} "
+            "of the input; more joints leave less"
+        )
     return out
+
+
+def as_trade(rig: JointRig, path: Path, size: int) -> str:
+    """What the rig costs and what it leaves, at LOD 0.
+
+    Args:
+        rig: what was made.
+        path: where it was written.
+        size: of the file, bytes.
+    """
+    level = rig.levels[0]
+    return (
+        f"{path}: {counted(len(rig.new_joints), 'new joint')}, deltas {rig.deltas_before:,} -> "
+        f"{rig.deltas_after:,}, {size:,} bytes, largest error {level.largest_with_shapes:.3f} mm "
+        f"(by joints alone {level.largest:.3f}), RMS by joints alone "
+        f"{100 * level.rms / rig.height_mm:.4f} % of {rig.height_mm:.0f} mm"
+    )
