@@ -69,7 +69,7 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
     if depsgraph is not None:
         timing.evaluated()
         evaluate.after_frame(depsgraph)
-    conditions.end_frame()
+    conditions.forget_written()
 
 
 def _is_rendered() -> bool:
@@ -133,6 +133,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
                     continue  # the evaluated copy knows of it only after the next update
                 evaluate.evaluate(rig, depsgraph)
     finally:
+        conditions.end_updates(depsgraph)
         _work.busy = False
 
 
@@ -303,6 +304,11 @@ def _before_save(*_arguments: object) -> None:
         refresh()
     repair.remove_dead()
     console.say(*sharing.share())
+    layer = current_context().view_layer
+    if layer is not None and ordinary.is_unknown(parts.rigs()):
+        layer.update()
+    if ordinary.is_unknown(parts.rigs()):
+        refresh(evaluate.Moment.ANEW)
     ordinary.take_on(parts.rigs())
 
 

@@ -14,7 +14,7 @@ import bpy
 import numpy as np
 
 from ...logic.base.sentences import Sentence, told
-from ..base import compat, drivers, parts, saved, session
+from ..base import compat, drivers, last_written, parts, saved, session
 from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 from ..character import armatures, meshes, runtime
 from . import live_keys
@@ -53,8 +53,11 @@ class _Kept:
 
 # Deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh objects that were written to since Blender last told of updates: these are no edits.
-_written: set[int] = session.keep("conditions.written", set, ("undo", "load"))
+# Mesh object -> number of the last write to it by us: an update that tells of it is no edit.
+_written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
+_writes = session.value("conditions.writes", 0, ("quit",))
+# Scene and view layer -> the last write that an update of its graph told of.
+_told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
 # Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
@@ -107,12 +110,26 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 def note_written(item: MeshObject) -> None:
     """A mesh is written to by us: the update that follows is no edit. Args: item  the mesh."""
-    _written.add(item.session_uid)
+    _writes.now += 1
+    _written[item.session_uid] = _writes.now
 
 
-def end_frame() -> None:
-    """A frame was evaluated: Blender does not tell of the updates that belong to it."""
+def forget_written() -> None:
+    """No update will tell of what was written: of a frame Blender evaluates it without a word."""
     _written.clear()
+
+
+def end_updates(depsgraph: Depsgraph) -> None:
+    """The handlers of an update end: what they wrote, Blender evaluates without a word.
+
+    Args:
+        depsgraph: whose update it is; those of other view layers tell of it later.
+    """
+    _told[_key_of(depsgraph)] = _writes.now
+
+
+def _key_of(depsgraph: Depsgraph) -> tuple[int, str]:
+    return depsgraph.scene.session_uid, depsgraph.view_layer.name
 
 
 @dataclass
@@ -120,11 +137,13 @@ class _Edits:
     """What an edit concerns.
 
     Attributes:
+        told: the last write that the graph has told of before.
         meshes: session uids of meshes of characters that somebody else edited.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object was edited that belongs to no character.
     """
 
+    told: int
     meshes: set[int] = field(default_factory=set)
     rigs: set[int] = field(default_factory=set)
     foreign: bool = False
@@ -141,8 +160,7 @@ class _Edits:
     def _add_object(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.Object) -> None:
         uid = item.session_uid
         if parts.MESH in item and parts.RIG in item:
-            ours = uid in _written
-            _written.discard(uid)
+            ours = _written.get(uid, 0) > self.told
             if not ours and (update.is_updated_geometry or update.is_updated_transform):
                 self.meshes.add(uid)
         elif parts.CONTROLS in item:
@@ -161,7 +179,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
     Returns:
         Session uids of meshes that somebody else than this add-on edited.
     """
-    edits = _Edits()
+    edits = _Edits(_told.get(_key_of(depsgraph), 0))
     for update in depsgraph.updates:
         item = update.id.original if update.id is not None else None
         if item is not None:
@@ -173,6 +191,8 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         own = {item.session_uid for item in parts.meshes_of(rig)} & edits.meshes
         armature = edits.rigs & {rig.session_uid, rig.data.session_uid}
         kept.is_fresh = not (edits.foreign or armature or own)
+        if own:
+            last_written.inputs.pop(rig.session_uid, None)  # of other weights, or another rest form
     look_quickly()
     return edits.meshes
 
@@ -325,24 +345,36 @@ def _curves(owner: bpy.types.Object | bpy.types.Key) -> Iterator[bpy.types.FCurv
 
 
 def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModifier | None:
-    """The armature modifier through which a rig deforms a mesh: the first one.
+    """The armature modifier through which a rig deforms a mesh.
 
     Args:
         item: the mesh.
         rig: the deforming armature.
+
+    Returns:
+        In Direct mode the one that was disabled by us, whatever it points to now; else the first
+        of this rig.
     """
+    marked = saved.whole(item, parts.FINISHED, 0)
+    own = None
     for modifier in item.modifiers:
-        if isinstance(modifier, bpy.types.ArmatureModifier) and modifier.object == rig:
-            return modifier
-    return None
+        if isinstance(modifier, bpy.types.ArmatureModifier):
+            if marked and compat.uid_of(modifier) == marked:
+                return modifier
+            if own is None and modifier.object == rig:
+                own = modifier
+    return own
 
 
 def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
     """Whether our armature modifier is the first that is enabled, and as it was built."""
     own = armature_of(item, rig)
-    if own is None:
+    if own is None or own.object != rig:
         yield told("{mesh} has no armature modifier of {rig}.", mesh=item.name, rig=rig.name)
         return
+    kin = (m for m in item.modifiers if isinstance(m, bpy.types.ArmatureModifier) and m != own)
+    if any(modifier.object == rig for modifier in kin):
+        yield told("{mesh} has several armature modifiers of {rig}.", mesh=item.name, rig=rig.name)
     enabled = own.show_viewport and own.show_render
     if not enabled and parts.FINISHED not in item:
         yield told("The armature modifier of {mesh} is disabled.", mesh=item.name)
