@@ -60,6 +60,8 @@ def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
     if not _work.rendering and not native.problem():
         for controls in filter(None, map(parts.controls_of, parts.rigs())):
             tweak_guard.settle(controls)
+        if controls_ahead.is_edited():
+            conditions.look_quickly()
     evaluate.before_frame(scene, _is_rendered())
 
 

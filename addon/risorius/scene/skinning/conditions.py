@@ -17,10 +17,11 @@ from ...logic.base.sentences import Sentence, told
 from ..base import compat, drivers, last_written, parts, saved, session
 from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 from ..character import armatures, meshes, runtime
-from . import live_keys
+from . import live_keys, skins
 
 _PLACES = ("location", "rotation", "scale", "delta")  # how data paths of an object's place begin
 _STRAIGHT = 1e-6  # of a matrix's elements, from which a mesh counts as moved against its rig
+_PLAIN = (True, False, False, False, "")  # see _settings
 _FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
 
 
@@ -58,6 +59,8 @@ _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
 # Scene and view layer -> the last write that an update of its graph told of.
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
+# Datablock that is no object -> number of its drivers when it was last updated.
+_drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
 # Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
@@ -129,7 +132,8 @@ def end_updates(depsgraph: Depsgraph) -> None:
 
 
 def _key_of(depsgraph: Depsgraph) -> tuple[int, str]:
-    return depsgraph.scene.session_uid, depsgraph.view_layer.name
+    layer = depsgraph.view_layer
+    return depsgraph.scene.session_uid, layer.name if layer is not None else ""
 
 
 @dataclass
@@ -154,8 +158,10 @@ class _Edits:
             self.rigs.add(item.session_uid)
         elif isinstance(item, bpy.types.Object):
             self._add_object(update, item)
-        elif isinstance(item, _FOREIGN_KINDS):
-            self.foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+        else:
+            if isinstance(item, _FOREIGN_KINDS):
+                self.foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+            self.foreign |= _has_other_drivers(item)
 
     def _add_object(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.Object) -> None:
         uid = item.session_uid
@@ -166,8 +172,18 @@ class _Edits:
         elif parts.CONTROLS in item:
             if update.is_updated_geometry:
                 self.rigs.add(uid)
+                skins.forget_bones(item)
         elif parts.RIG not in item:
             self.foreign = True
+
+
+def _has_other_drivers(item: bpy.types.ID) -> bool:
+    """Whether a datablock has more or fewer drivers than at its last update."""
+    data = getattr(item, "animation_data", None)
+    count = len(data.drivers) if data is not None else 0
+    was = _drivers.get(item.session_uid, 0)
+    _drivers[item.session_uid] = count
+    return count != was
 
 
 def note_updates(depsgraph: Depsgraph) -> set[int]:
@@ -191,7 +207,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         own = {item.session_uid for item in parts.meshes_of(rig)} & edits.meshes
         armature = edits.rigs & {rig.session_uid, rig.data.session_uid}
         kept.is_fresh = not (edits.foreign or armature or own)
-        if own:
+        if own or armature:
             last_written.inputs.pop(rig.session_uid, None)  # of other weights, or another rest form
     look_quickly()
     return edits.meshes
@@ -203,6 +219,7 @@ def look_quickly() -> None:
         kept = _kept.get(rig.session_uid)
         if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
             kept.is_fresh = False
+            last_written.inputs.pop(rig.session_uid, None)
 
 
 def stale(rig: ArmatureObject) -> bool:
@@ -221,7 +238,9 @@ def _signature(rig: ArmatureObject) -> tuple[object, ...]:
 def _mesh_signature(item: MeshObject) -> tuple[object, ...]:
     data, key = item.data, item.data.shape_keys
     stack = tuple((m.name, m.show_viewport, m.show_render) for m in item.modifiers)
+    own = next((m for m in item.modifiers if isinstance(m, bpy.types.ArmatureModifier)), None)
     first = (item.mode, stack, data.users, len(data.vertices), len(item.constraints))
+    first += (() if own is None else _settings(own), skins.address_of(item))
     if key is None:
         return (*first, item.get(parts.MODE))
     blocks = key.key_blocks
@@ -230,6 +249,11 @@ def _mesh_signature(item: MeshObject) -> tuple[object, ...]:
     blocks.foreach_get("mute", mutes)
     pinned = item.show_only_shape_key, item.active_shape_key_index, key.use_relative
     return (*first, values.tobytes(), mutes.tobytes(), *pinned)
+
+
+def _settings(own: bpy.types.ArmatureModifier) -> tuple[object, ...]:
+    flags = own.use_vertex_groups, own.use_bone_envelopes, own.use_deform_preserve_volume
+    return (*flags, own.use_multi_modifier, own.vertex_group)
 
 
 def look(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
@@ -378,9 +402,7 @@ def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
     enabled = own.show_viewport and own.show_render
     if not enabled and parts.FINISHED not in item:
         yield told("The armature modifier of {mesh} is disabled.", mesh=item.name)
-    plain = own.use_vertex_groups and not own.use_bone_envelopes
-    plain = plain and not own.use_deform_preserve_volume and not own.use_multi_modifier
-    if not plain or own.vertex_group:
+    if _settings(own) != _PLAIN:
         yield told("The armature modifier of {mesh} was changed.", mesh=item.name)
     for modifier in item.modifiers:
         if modifier == own:

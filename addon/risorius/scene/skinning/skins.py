@@ -46,12 +46,16 @@ class Skin:
         skin: risorius.Skin of its vertex groups.
         base: float32[V, 3], its reference key.
         mark: see _mark.
+        names: those of the Bones that it was compiled for.
+        address: see address_of.
     """
 
     mesh: int
     skin: native.Skin
     base: NDArray[np.float32]
     mark: tuple[object, ...]
+    names: dict[str, int]
+    address: int
 
 
 # Deforming armature -> Bones; mesh object -> Skin.
@@ -96,12 +100,35 @@ def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     """
     uid = item.session_uid
     kept = _skins.get(uid)
-    if kept is not None and uid in _unsure and kept.mark != _mark(item):
+    if kept is not None and not _holds(kept, item, bones):
         kept = None
+        meshes.note_edit(uid)
     _unsure.discard(uid)
     if kept is None:
         kept = _skins[uid] = _read_skin(item, bones, live)
     return kept
+
+
+def _holds(kept: Skin, item: MeshObject, bones: Bones) -> bool:
+    """Whether the skin of a mesh is still that of its vertex groups and these bones."""
+    if kept.names is not bones.names:
+        if kept.names != bones.names:
+            return False
+        kept.names = bones.names
+    if item.session_uid in _unsure:
+        return kept.mark == _mark(item)
+    return kept.address == address_of(item)
+
+
+def address_of(item: MeshObject) -> int:
+    """Where the weights of the first vertex lie.
+
+    Whoever writes weights that an evaluated mesh shares moves them: this tells of it before
+    Blender does.
+    """
+    vertices = item.data.vertices
+    groups = vertices[0].groups if len(vertices) else ()
+    return groups[0].as_pointer() if len(groups) else 0
 
 
 def _read_bones(rig: ArmatureObject) -> Bones:
@@ -146,7 +173,8 @@ def _read_skin(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     skin = native.module().Skin(
         count, offsets, places[kept].astype(np.uint32), weights[kept], len(bones.names)
     )
-    return Skin(item[parts.MESH], skin, meshes.basis_of(item), _mark(item))
+    rest = meshes.basis_of(item)
+    return Skin(item[parts.MESH], skin, rest, _mark(item), bones.names, address_of(item))
 
 
 _Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
