@@ -93,6 +93,6 @@ class Pair:
 
     def check(self, near=NEAR):
         """Both show the same, and do so when they move."""
-        for values in ({"jawOpen": 0.9}, {"jawOpen": 0.3, "mouthCornerPullL": 0.8}):
-            self.set(**values)
+        for values in ((0.9, 0.2), (0.3, 0.8)):
+            self.set(jawOpen=values[0], mouthCornerPullL=values[1])
             assert self.apart() < near

@@ -388,6 +388,7 @@ def unregister() -> None:
         refresh()
     for rig in parts.rigs():
         ordinary.leave(rig)
+        rig.update_tag(refresh={"OBJECT"})
     for name, handler in reversed(_there()):
         present = getattr(bpy.app.handlers, name)
         if handler in present:

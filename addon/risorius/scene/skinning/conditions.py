@@ -172,7 +172,7 @@ class _Edits:
         elif parts.CONTROLS in item:
             if update.is_updated_geometry:
                 self.rigs.add(uid)
-                skins.forget_bones(item)
+                skins.forget_bones(uid)
         elif parts.RIG not in item:
             self.foreign = True
 

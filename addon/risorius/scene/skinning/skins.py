@@ -77,9 +77,9 @@ def forget(uids: set[int]) -> None:
         meshes.note_edit(uid)
 
 
-def forget_bones(rig: ArmatureObject) -> None:
-    """Bones of an armature were edited. Args: rig  deforming armature."""
-    _bones.pop(rig.session_uid, None)
+def forget_bones(uid: int) -> None:
+    """Bones of an armature were edited or posed. Args: uid  of the deforming armature."""
+    _bones.pop(uid, None)
 
 
 def bones_of(rig: ArmatureObject) -> Bones:
@@ -127,8 +127,8 @@ def address_of(item: MeshObject) -> int:
     Blender does.
     """
     vertices = item.data.vertices
-    groups = vertices[0].groups if len(vertices) else ()
-    return groups[0].as_pointer() if len(groups) else 0
+    there = len(vertices) and len(vertices[0].groups)
+    return vertices[0].groups[0].as_pointer() if there else 0
 
 
 def _read_bones(rig: ArmatureObject) -> Bones:
