@@ -23,13 +23,25 @@ def is_direct(rig, *numbers):
 
 
 def normals(item):
-    """float64[C, 3] of the corners of the mesh that Blender shows."""
+    """float64[C, 3] of the corners of the mesh that Blender shows; bool[C] which of them count.
+
+    Where faces of opposite sides meet, as in the teeth of coarse levels, there is no normal.
+    """
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = seen.to_mesh()
-    flat = np.empty(len(mesh.loops) * 3, np.float32)
+    corners, faces = len(mesh.loops), len(mesh.polygons)
+    flat, sides = np.empty(corners * 3, np.float32), np.empty(faces * 3, np.float32)
+    points, sizes = np.empty(corners, np.int32), np.empty(faces, np.int32)
     mesh.corner_normals.foreach_get("vector", flat)
+    mesh.polygons.foreach_get("normal", sides)
+    mesh.polygons.foreach_get("loop_total", sizes)
+    mesh.loops.foreach_get("vertex_index", points)
+    mean = np.zeros((len(mesh.vertices), 3))
+    np.add.at(mean, points, np.repeat(sides.reshape(-1, 3), sizes, axis=0))
+    mean /= np.maximum(np.bincount(points, minlength=len(mean)), 1)[:, None]
     seen.to_mesh_clear()
-    return flat.reshape(-1, 3).astype(np.float64)
+    there = np.linalg.norm(mean, axis=1)[points] > 0.1
+    return flat.reshape(-1, 3).astype(np.float64), there
 
 
 def bones(rig):
