@@ -7,7 +7,7 @@ import bmesh
 import bpy
 import numpy as np
 import pytest
-from support import both_ways, scene
+from support import animation, both_ways, scene
 
 
 @pytest.fixture
@@ -395,6 +395,31 @@ def test_an_edited_rest_form(pair):
     pair.edit(basis_edited)
     pair.check()
     assert both_ways.is_direct(pair.direct)
+
+
+def test_sliders_and_frames_look_at_nothing_again(pair, monkeypatch):
+    """Plans and weights are read after edits alone: they take longer than a frame."""
+    conditions, skins = (scene.submodule(f"scene.skinning.{n}") for n in ("conditions", "skins"))
+    animation.animate(pair.direct)
+    bpy.context.scene.frame_set(2)
+    read = []
+    for module, name in ((conditions, "look"), (conditions, "look_quickly"), (skins, "_read_skin"),
+                         (skins, "_mark")):  # fmt: skip
+        monkeypatch.setattr(module, name, _noted(getattr(module, name), read))
+    for frame in range(3, 8):
+        bpy.context.scene.frame_set(frame)
+    assert not read
+    for step in range(1, 5):
+        pair.set(jawOpen=step / 5, eyeLookUpL=step / 6)
+    assert set(read) <= {"look_quickly"}
+
+
+def _noted(function, read):
+    def noting(*given):
+        read.append(function.__name__)
+        return function(*given)
+
+    return noting
 
 
 def test_a_deleted_live_key(pair):

@@ -61,7 +61,7 @@ def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
         for controls in filter(None, map(parts.controls_of, parts.rigs())):
             tweak_guard.settle(controls)
         if controls_ahead.is_edited():
-            conditions.look_quickly()
+            conditions.look_at_tagged(scene)
     evaluate.before_frame(scene, _is_rendered())
 
 

@@ -222,6 +222,28 @@ def look_quickly() -> None:
             last_written.inputs.pop(rig.session_uid, None)
 
 
+_TAGGED = ("OBJECT", "MESH", "KEY", "ARMATURE", "COLLECTION", "SCENE")
+
+
+def look_at_tagged(scene: bpy.types.Scene) -> None:
+    """Before a frame: look at what a script has edited since the last update of a scene.
+
+    Without an interface Blender tells of it only with the frame, among all that is animated.
+
+    Args:
+        scene: the original.
+    """
+    graphs = [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
+    tagged = {kind for kind in _TAGGED for graph in graphs if graph.id_type_updated(kind)}
+    if not tagged:
+        return
+    look_quickly()
+    if "MESH" in tagged:
+        skins.doubt()
+        for rig in parts.rigs():
+            last_written.inputs.pop(rig.session_uid, None)
+
+
 def stale(rig: ArmatureObject) -> bool:
     """Whether a face has a plan that no longer holds. Args: rig  deforming armature."""
     kept = _kept.get(rig.session_uid)
@@ -240,7 +262,7 @@ def _mesh_signature(item: MeshObject) -> tuple[object, ...]:
     stack = tuple((m.name, m.show_viewport, m.show_render) for m in item.modifiers)
     own = next((m for m in item.modifiers if isinstance(m, bpy.types.ArmatureModifier)), None)
     first = (item.mode, stack, data.users, len(data.vertices), len(item.constraints))
-    first += (() if own is None else _settings(own), skins.address_of(item))
+    first += () if own is None else _settings(own)
     if key is None:
         return (*first, item.get(parts.MODE))
     blocks = key.key_blocks

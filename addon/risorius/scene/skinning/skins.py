@@ -47,7 +47,6 @@ class Skin:
         base: float32[V, 3], its reference key.
         mark: see _mark.
         names: those of the Bones that it was compiled for.
-        address: see address_of.
     """
 
     mesh: int
@@ -55,7 +54,6 @@ class Skin:
     base: NDArray[np.float32]
     mark: tuple[object, ...]
     names: dict[str, int]
-    address: int
 
 
 # Deforming armature -> Bones; mesh object -> Skin.
@@ -66,7 +64,7 @@ _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
 
 @session.at("undo")
 def doubt() -> None:
-    """After undo a skin is compared with its mesh before it is used again."""
+    """Compare each skin with its mesh before it is used again: after undo, and before a frame."""
     _unsure.update(_skins)
 
 
@@ -115,20 +113,7 @@ def _holds(kept: Skin, item: MeshObject, bones: Bones) -> bool:
         if kept.names != bones.names:
             return False
         kept.names = bones.names
-    if item.session_uid in _unsure:
-        return kept.mark == _mark(item)
-    return kept.address == address_of(item)
-
-
-def address_of(item: MeshObject) -> int:
-    """Where the weights of the first vertex lie.
-
-    Whoever writes weights that an evaluated mesh shares moves them: this tells of it before
-    Blender does.
-    """
-    vertices = item.data.vertices
-    there = len(vertices) and len(vertices[0].groups)
-    return vertices[0].groups[0].as_pointer() if there else 0
+    return item.session_uid not in _unsure or kept.mark == _mark(item)
 
 
 def _read_bones(rig: ArmatureObject) -> Bones:
@@ -173,8 +158,7 @@ def _read_skin(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     skin = native.module().Skin(
         count, offsets, places[kept].astype(np.uint32), weights[kept], len(bones.names)
     )
-    rest = meshes.basis_of(item)
-    return Skin(item[parts.MESH], skin, rest, _mark(item), bones.names, address_of(item))
+    return Skin(item[parts.MESH], skin, meshes.basis_of(item), _mark(item), bones.names)
 
 
 _Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
