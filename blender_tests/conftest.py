@@ -99,9 +99,9 @@ def _repository(installed):
     addon_utils.extensions_refresh(ensure_wheels=False)
 
 
-@pytest.fixture(params=["LIVE", "KEYS"])
+@pytest.fixture(params=["AUTO", "LIVE", "KEYS"])
 def mode(request):
-    """Both ways of keeping shapes."""
+    """All ways of showing a face: Direct, with a live key on posed bones, with real keys."""
     return request.param
 
 

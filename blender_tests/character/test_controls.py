@@ -88,6 +88,9 @@ def test_head_bone_turns_the_head_joint_on_top(mode, dna_file):
     bone.rotation_mode = "XYZ"
     bone.rotation_euler = (0.0, 0.5, 0.0)  # about the upright axis
     scene.update(scene.controls(rig))
+    seen = scene.snapshot(rig)
+    scene.pose_bones(rig)
+    np.testing.assert_allclose(scene.snapshot(rig), seen, atol=1e-5)
     head = next(b for b in rig.pose.bones if b.bone["dna_joint"] == HEAD)
     turn = head.matrix.to_3x3() @ head.bone.matrix_local.to_3x3().inverted()
     axis, angle = turn.to_quaternion().to_axis_angle()

@@ -190,7 +190,7 @@ def test_a_mesh_of_other_topology_is_left_alone(mode, dna_file):
     bpy.ops.mesh.subdivide()
     bpy.ops.object.mode_set(mode="OBJECT")
     count, keys = len(head.data.vertices), len(_keys(rig))
-    _switch("KEYS" if mode == "LIVE" else "LIVE")
+    _switch("KEYS" if mode != "KEYS" else "LIVE")
     assert (len(head.data.vertices), len(_keys(rig))) == (count, keys)
 
 

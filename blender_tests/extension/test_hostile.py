@@ -18,6 +18,12 @@ SEED = 20261121
 QUICK = {"shape_mode": "LIVE", "use_materials": False}
 
 
+@pytest.fixture(params=["AUTO", "KEYS"])
+def mode(request):
+    """The default, and real keys."""
+    return request.param
+
+
 def _one_sentence(text, path):
     """What is said names the file, in one printable sentence."""
     assert "Traceback" not in text, text
@@ -160,7 +166,7 @@ def test_odd_but_well_formed_files(name, mode, tmp_path, capsys):
         for frame in (2, 3):
             bpy.context.scene.frame_set(frame)
         _draw_panels()
-        bpy.ops.risorius.set_shape_mode(mode="KEYS" if mode == "LIVE" else "LIVE")
+        bpy.ops.risorius.set_shape_mode(mode="KEYS" if mode != "KEYS" else "LIVE")
         bpy.ops.risorius.key()
         bpy.ops.risorius.reset()
         for action in list(bpy.data.actions):

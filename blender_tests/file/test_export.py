@@ -23,6 +23,12 @@ CONVENTIONS = [
 ]
 
 
+@pytest.fixture(params=["AUTO", "KEYS"])
+def mode(request):
+    """What is written to a file does not depend on posed bones."""
+    return request.param
+
+
 def _export(folder, **options):
     path = folder / "out.dna"
     assert bpy.ops.risorius.export_dna(filepath=str(path), **options) == {"FINISHED"}

@@ -40,7 +40,8 @@ def test_save_and_reload_with_the_source_gone(mode, dna_file, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     dna_file.unlink()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    np.testing.assert_array_equal(scene.snapshot(_rig()), before)
+    near = 1e-6 if mode == "AUTO" else 0.0  # the file has posed bones, which Blender adds up
+    np.testing.assert_allclose(scene.snapshot(_rig()), before, rtol=0, atol=near)
     again = tmp_path / "again.dna"
     again.write_bytes(content)
     _moves_and_is_right(_rig(), again)

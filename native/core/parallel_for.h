@@ -12,9 +12,10 @@
 namespace risorius::core {
 
 /// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores,
-/// and never more than 256), the caller's among them. What a body throws, such as bad_alloc, is
-/// thrown again when all threads have ended; of several the first. In: ranges  for each thread;
-/// several where the work of one may be far more than of another: who is done takes the next
+/// and never more than 256). What a body throws, such as bad_alloc, is thrown again when all
+/// threads have ended; of several the first.
+/// In: ranges  for each thread; several where the work of one may be far more than of another: who
+/// is done takes the next
 template <class Body>
 void parallel_for(std::size_t n, std::size_t threads, const Body& body, std::size_t ranges = 1) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
@@ -39,9 +40,8 @@ void parallel_for(std::size_t n, std::size_t threads, const Body& body, std::siz
   };
   {
     std::vector<std::jthread> workers;
-    workers.reserve(threads - 1);
-    for (std::size_t t = 1; t < threads; ++t) workers.emplace_back(work);
-    work();
+    workers.reserve(threads);
+    for (std::size_t t = 0; t < threads; ++t) workers.emplace_back(work);
   }
   if (failure) std::rethrow_exception(failure);
 }

@@ -62,6 +62,34 @@ struct ColumnsByTwo {
     _mm_storel_pi(reinterpret_cast<__m64*>(out), moved);
     _mm_store_ss(out + 2, _mm_movehl_ps(moved, moved));
   }
+  // Columns times the numbers of a point, summed up by two. In: numbers  four that hold the point's
+  // from kFirst on
+  template <int kFirst>
+  RISORIUS_INLINE static __m256 products(const Sum& sum, const float* numbers) {
+    constexpr int x = kFirst, y = x + 1, z = x + 2;
+    const __m256 both = _mm256_broadcast_ps(reinterpret_cast<const __m128*>(numbers));
+    const __m256 first = _mm256_permutevar_ps(both, _mm256_setr_epi32(x, x, x, x, y, y, y, y)),
+                 second =
+                     _mm256_blend_ps(_mm256_permute_ps(both, z * 0x55), _mm256_set1_ps(1.0f), 0xF0);
+    return _mm256_fmadd_ps(sum.c[0], first, _mm256_mul_ps(sum.c[1], second));
+  }
+  // Neighbours.
+  RISORIUS_INLINE static void finish_four(const Sum* sums, const float* points, float* out) {
+    const __m256 a = products<0>(sums[0], points), b = products<0>(sums[1], points + 3),
+                 c = products<0>(sums[2], points + 6), d = products<1>(sums[3], points + 8);
+    const __m256 ab = _mm256_add_ps(_mm256_permute2f128_ps(a, b, 0x20),
+                                    _mm256_permute2f128_ps(a, b, 0x31)),
+                 cd = _mm256_add_ps(_mm256_permute2f128_ps(c, d, 0x20),
+                                    _mm256_permute2f128_ps(c, d, 0x31));
+    const __m128 by_a = _mm256_castps256_ps128(ab), by_b = _mm256_extractf128_ps(ab, 1),
+                 by_c = _mm256_castps256_ps128(cd), by_d = _mm256_extractf128_ps(cd, 1);
+    const __m128 by[3] = {
+        _mm_insert_ps(by_a, by_b, 0x30), _mm_shuffle_ps(by_b, by_c, _MM_SHUFFLE(1, 0, 2, 1)),
+        _mm_blend_ps(_mm_permute_ps(by_d, _MM_SHUFFLE(2, 1, 0, 0)), _mm_permute_ps(by_c, 0xAA), 1)};
+    __m128 moved[3];
+    for (std::size_t i = 0; i < 3; ++i) moved[i] = _mm_add_ps(_mm_loadu_ps(points + 4 * i), by[i]);
+    for (std::size_t i = 0; i < 3; ++i) _mm_storeu_ps(out + 4 * i, moved[i]);
+  }
   RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_columns(matrix, row); }
 };
 

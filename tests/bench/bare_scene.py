@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames of a scene with faces, written by a loop that knows nothing of faces: Blender's own time."""
+"""Frames of faces, written by a loop that knows nothing of faces: they take Blender's own time."""
 
 from __future__ import annotations
 
@@ -42,9 +42,9 @@ class Bare:
         for rig_name, bones, keys in self.poses[0]:
             for item_name, _points in keys if not bones else ():
                 for modifier in bpy.data.objects[item_name].modifiers:
-                    if modifier.type == "ARMATURE" and modifier.object.name == rig_name:
-                        if modifier.show_viewport:
-                            modifier.show_viewport = False
+                    ours = modifier.type == "ARMATURE" and modifier.object.name == rig_name
+                    if ours and modifier.show_viewport:
+                        modifier.show_viewport = False
 
     def write(self, *_arguments):
         """Write the next pose; a handler of Blender may call it."""

@@ -4,6 +4,7 @@
 #include <benchmark/benchmark.h>
 
 #include <cstdint>
+#include <cstring>
 
 #if (defined(__x86_64__) || defined(_M_X64)) && !defined(_MSC_VER)
 #include <immintrin.h>
@@ -38,21 +39,41 @@ const Data& data() {
   return made;
 }
 
+// Row i of four whose bones are one number.
+const float* row(const Data& d, std::uint64_t four, std::size_t i) {
+  return d.rows + std::size_t{static_cast<std::uint16_t>(four >> (16 * (i % 4)))} * kRow;
+}
+
+std::uint64_t four_bones(const Data& d, std::size_t i) {
+  std::uint64_t four;
+  std::memcpy(&four, d.bones + i, sizeof four);
+  return four;
+}
+
 // As many sums as registers hold, which do not wait for each other.
 
 #ifdef RISORIUS_WIDE
 
-__attribute__((target("avx512f"))) float issue_512(const Data& d, std::size_t influences) {
+__attribute__((target("avx512f,avx512dq,avx512vl"))) float issue_512(const Data& d,
+                                                                     std::size_t influences) {
   constexpr std::size_t kSums = 12;
+  constexpr __mmask16 kAll = 0xFFFF;
   __m512 s[kSums];
   for (__m512& sum : s) sum = _mm512_setzero_ps();
   for (std::size_t done = 0; done < influences; done += kOnce) {
     benchmark::ClobberMemory();
     for (std::size_t i = 0; i < kOnce; i += kSums) {
-#pragma GCC unroll 12
-      for (std::size_t k = 0; k < kSums; ++k) {
-        s[k] = _mm512_fmadd_ps(_mm512_set1_ps(d.weights[i + k]),
-                               _mm512_load_ps(d.rows + std::size_t{d.bones[i + k]} * kRow), s[k]);
+#pragma GCC unroll 3
+      for (std::size_t k = 0; k < kSums; k += 4) {
+        const std::uint64_t four = four_bones(d, i + k);
+        const __m512 w = _mm512_maskz_broadcast_f32x4(kAll, _mm_load_ps(d.weights + i + k));
+        const __m512 each[] = {
+            _mm512_maskz_permute_ps(kAll, w, 0x00), _mm512_maskz_permute_ps(kAll, w, 0x55),
+            _mm512_maskz_permute_ps(kAll, w, 0xAA), _mm512_maskz_permute_ps(kAll, w, 0xFF)};
+#pragma GCC unroll 4
+        for (std::size_t n = 0; n < 4; ++n) {
+          s[k + n] = _mm512_fmadd_ps(each[n], _mm512_load_ps(row(d, four, n)), s[k + n]);
+        }
       }
     }
   }
@@ -65,18 +86,21 @@ __attribute__((target("avx512f"))) float issue_512(const Data& d, std::size_t in
 }
 
 __attribute__((target("avx2,fma"))) float issue_256(const Data& d, std::size_t influences) {
-  constexpr std::size_t kSums = 6;
+  constexpr std::size_t kSums = 4;
   __m256 s[kSums][2];
   for (auto& sum : s) sum[0] = sum[1] = _mm256_setzero_ps();
   for (std::size_t done = 0; done < influences; done += kOnce) {
     benchmark::ClobberMemory();
     for (std::size_t i = 0; i < kOnce; i += kSums) {
-#pragma GCC unroll 6
-      for (std::size_t k = 0; k < kSums; ++k) {
-        const float* row = d.rows + std::size_t{d.bones[i + k]} * kRow;
-        const __m256 w = _mm256_broadcast_ss(d.weights + i + k);
-        s[k][0] = _mm256_fmadd_ps(w, _mm256_load_ps(row), s[k][0]);
-        s[k][1] = _mm256_fmadd_ps(w, _mm256_load_ps(row + 8), s[k][1]);
+      const std::uint64_t four = four_bones(d, i);
+      const __m256 w = _mm256_broadcast_ps(reinterpret_cast<const __m128*>(d.weights + i));
+      const __m256 each[] = {_mm256_permute_ps(w, 0x00), _mm256_permute_ps(w, 0x55),
+                             _mm256_permute_ps(w, 0xAA), _mm256_permute_ps(w, 0xFF)};
+#pragma GCC unroll 4
+      for (std::size_t n = 0; n < 4; ++n) {
+        const float* from = row(d, four, n);
+        s[n][0] = _mm256_fmadd_ps(each[n], _mm256_load_ps(from), s[n][0]);
+        s[n][1] = _mm256_fmadd_ps(each[n], _mm256_load_ps(from + 8), s[n][1]);
       }
     }
   }
@@ -98,10 +122,10 @@ float issue_128(const Data& d, std::size_t influences) {
     for (std::size_t i = 0; i < kOnce; i += kSums) {
 #pragma GCC unroll 4
       for (std::size_t k = 0; k < kSums; ++k) {
-        const float* row = d.rows + std::size_t{d.bones[i + k]} * kRow;
+        const float* from = d.rows + std::size_t{d.bones[i + k]} * kRow;
         const __m128 w = _mm_set1_ps(d.weights[i + k]);
         for (std::size_t r = 0; r < 3; ++r) {
-          s[k][r] = _mm_add_ps(s[k][r], _mm_mul_ps(w, _mm_load_ps(row + 4 * r)));
+          s[k][r] = _mm_add_ps(s[k][r], _mm_mul_ps(w, _mm_load_ps(from + 4 * r)));
         }
       }
     }
@@ -125,10 +149,10 @@ float issue_128(const Data& d, std::size_t influences) {
     for (std::size_t i = 0; i < kOnce; i += kSums) {
 #pragma GCC unroll 8
       for (std::size_t k = 0; k < kSums; ++k) {
-        const float* row = d.rows + std::size_t{d.bones[i + k]} * kRow;
+        const float* from = d.rows + std::size_t{d.bones[i + k]} * kRow;
         const float32x4_t w = vld1q_dup_f32(d.weights + i + k);
         for (std::size_t r = 0; r < 3; ++r) {
-          s[k][r] = vfmaq_f32(s[k][r], w, vld1q_f32(row + 4 * r));
+          s[k][r] = vfmaq_f32(s[k][r], w, vld1q_f32(from + 4 * r));
         }
       }
     }
@@ -145,8 +169,8 @@ float issue_128(const Data& d, std::size_t influences) {
   for (std::size_t done = 0; done < influences; done += kOnce) {
     benchmark::ClobberMemory();
     for (std::size_t i = 0; i < kOnce; ++i) {
-      const float* row = d.rows + std::size_t{d.bones[i]} * kRow;
-      for (std::size_t r = 0; r < 12; ++r) s[r] += d.weights[i] * row[r];
+      const float* from = d.rows + std::size_t{d.bones[i]} * kRow;
+      for (std::size_t r = 0; r < 12; ++r) s[r] += d.weights[i] * from[r];
     }
   }
   float sum = 0;

@@ -5,6 +5,8 @@
 #include <cstring>
 
 #include "compile/compile.h"
+#include "rig/outputs/joint_chain.h"
+#include "rig/outputs/skin.h"
 #include "rig/stages/evaluate.h"
 #include "rig/stages/tables.h"
 
@@ -158,6 +160,46 @@ bool add(const dna::Dna& dna, compile::Precision precision, Numbers& numbers, Ha
   return true;
 }
 
+// Some vertices of 0 to 15 influences on a chain of bones.
+bool add_skin(Numbers& numbers, Hash& hash) {
+  constexpr std::uint32_t kBones = 20, kVertices = 200;
+  std::vector<std::int32_t> parents;
+  std::vector<double> rest;
+  std::vector<float> location, rotation, scale, weights, points;
+  for (std::uint32_t b = 0; b < kBones; ++b) {
+    parents.push_back(static_cast<std::int32_t>(b) - 1);
+    for (std::size_t i = 0; i < 16; ++i) {
+      const double v = (i % 5 == 0 ? 1.0 : 0.0) + double{numbers.within(-0.2f, 0.2f)};
+      rest.push_back(i < 12 ? v : (i == 15 ? 1.0 : 0.0));
+    }
+    for (int i = 0; i < 3; ++i) location.push_back(numbers.within(-0.1f, 0.1f));
+    for (int i = 0; i < 4; ++i) rotation.push_back(numbers.within(-1.0f, 1.0f));
+    for (int i = 0; i < 3; ++i) scale.push_back(numbers.within(0.8f, 1.2f));
+  }
+  std::vector<std::uint32_t> offsets{0}, bones;
+  for (std::uint32_t v = 0; v < kVertices; ++v) {
+    for (std::uint32_t i = numbers.below(16); i > 0; --i) {
+      bones.push_back(numbers.below(kBones));
+      weights.push_back(numbers.within(0.1f, 1.0f));
+    }
+    offsets.push_back(static_cast<std::uint32_t>(bones.size()));
+    for (int i = 0; i < 3; ++i) points.push_back(numbers.within(-1.0f, 1.0f));
+  }
+  const auto chain = rig::make_joint_chain(parents, rest.data());
+  const auto skin = rig::make_skin(kVertices, offsets, bones, weights, kBones);
+  if (!chain || !skin) return false;
+  std::vector<rig::JointChain::Affine> work(kBones);
+  std::vector<float> matrices(kBones * 12);
+  rig::evaluate_chain(*chain, location.data(), rotation.data(), scale.data(), work.data(),
+                      matrices.data());
+  hash.take(matrices);
+  core::AlignedVector<float> rows((kBones + 1) * simd::kSkinRow);
+  simd::scalar_kernels().skin_rows(matrices.data(), kBones, rows.data());
+  rig::evaluate_skin(*skin, simd::scalar_kernels(), rows.data(), points.data(), points.data());
+  hash.take(points);
+  return true;
+}
+
 }  // namespace
 
 int main() {
@@ -167,6 +209,7 @@ int main() {
     const dna::Dna dna = face(numbers);
     if (!add(dna, compile::Precision::kFloat32, numbers, hash)) return 1;
     if (!add(dna, compile::Precision::kFloat16, numbers, hash)) return 1;
+    if (!add_skin(numbers, hash)) return 1;
   }
   std::printf("%016llx\n", static_cast<unsigned long long>(hash.value()));
 }

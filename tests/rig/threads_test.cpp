@@ -8,6 +8,7 @@
 
 #include "core/parallel_for.h"
 #include "rig/block.h"
+#include "rig/direct/direct_face.h"
 #include "rig/stages/evaluate.h"
 #include "rig/stages/instance.h"
 #include "support/face.h"
@@ -157,6 +158,64 @@ TEST(OneRig, SealsItsBlockOnceWhoeverAsksFirst) {
   });
   EXPECT_EQ(wrong, 0);
   EXPECT_EQ(rig.block().data(), Rig(rig).block().data());
+}
+
+// A face of make_full_face with a mesh of many blocks.
+FaceParts many_blocks(const Rig& rig) {
+  constexpr std::uint32_t kVertices = 5 * kSkinBlock + 7;
+  FaceParts parts;
+  parts.rig = std::make_shared<Rig>(rig);
+  const std::vector<float> neutral(rig.joint_count * 3, 0.0f);
+  parts.space = std::make_shared<BoneSpace>(make_bone_space({}, neutral.data(), 3, {0, 1, 2}));
+  std::vector<double> rest;
+  for (std::size_t i = 0; i < 48; ++i) rest.push_back(i % 16 % 5 == 0 ? 1.0 : 0.0);
+  const std::vector<std::int32_t> parents{-1, 0, 1};
+  parts.chain = std::make_shared<JointChain>(make_joint_chain(parents, rest.data()).value());
+  parts.rows = {0, 1, 2};
+  Morph morph;
+  morph.vertex_count = kVertices, morph.channel_count = rig.blend_shape_count;
+  morph.channels = {1}, morph.channel_offsets = {0, kVertices};
+  FaceParts::Mesh mesh;
+  std::vector<std::uint32_t> offsets{0}, bones;
+  for (std::uint32_t v = 0; v < kVertices; ++v) {
+    morph.deltas.push_back({v, 0.1f, 0.2f, 0.3f});
+    mesh.base.insert(mesh.base.end(), {static_cast<float>(v % 97), 1.0f, 2.0f});
+    for (std::uint32_t i = 0; i < v % 4; ++i) bones.push_back((v + i) % 3);
+    offsets.push_back(static_cast<std::uint32_t>(bones.size()));
+  }
+  const std::vector<float> weights(bones.size(), 0.4f);
+  mesh.skin = std::make_shared<Skin>(make_skin(kVertices, offsets, bones, weights, 3).value());
+  mesh.morph = std::make_shared<Morph>(std::move(morph));
+  parts.meshes = {mesh, mesh};
+  return parts;
+}
+
+TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
+  const Rig rig = full_rig({});
+  std::vector<std::vector<std::vector<float>>> all;  // of each number of threads, the meshes
+  for (const std::size_t threads : {1u, 2u, 5u, 8u}) {
+    std::vector<std::unique_ptr<DirectFace>> faces;
+    std::vector<DirectFace*> pointers;
+    std::vector<std::vector<float>> raw, out;
+    for (std::size_t f = 0; f < 3; ++f) {
+      faces.push_back(DirectFace::make(many_blocks(rig)).value());
+      pointers.push_back(faces.back().get());
+      for (int m = 0; m < 2; ++m) out.emplace_back(faces[f]->parts().meshes[0].base.size(), 1e30f);
+    }
+    for (std::size_t n = 0; n < 4; ++n) {
+      std::vector<FaceFrame> frames(3);
+      for (std::size_t f = 0; f < 3; ++f) {
+        raw.push_back(frame(n + f));
+        frames[f].targets = {{0, out[2 * f].data()}, {1, out[2 * f + 1].data()}};
+      }
+      for (std::size_t f = 0; f < 3; ++f) frames[f].raw = raw[3 * n + f].data();
+      evaluate_faces(pointers, frames, threads);
+      EXPECT_TRUE(frames[0].targets[0].written && frames[2].targets[1].written);
+    }
+    all.push_back(out);
+  }
+  for (const auto& out : all) EXPECT_EQ(out, all[0]);
+  EXPECT_NE(all[0][0], all[0][2]);  // of another frame
 }
 
 // Not of the tsan preset's OneRig: exceptions pass between threads.

@@ -472,10 +472,35 @@ TEST_P(SimdKernels, WriteNoFurtherThanTheWidestVector) {
   }
 }
 
+// Ten vertices of eight influences of a few bones, in three groups.
+std::vector<float> skinned(const Kernels& kernels) {
+  std::mt19937 random(8);
+  const Matrix<float> matrices = random_matrix(12, 5, random),
+                      points = random_matrix(3, 10, random);
+  const std::vector<float> weights = random_weights(3 * kSkinGroup * 8, random);
+  std::vector<std::uint16_t> vertices(10), bones(3 * kSkinGroup * 8);
+  for (std::uint16_t v = 0; v < 10; ++v) vertices[v] = v;
+  for (std::size_t i = 0; i < bones.size(); ++i) bones[i] = static_cast<std::uint16_t>(i * 7 % 5);
+  alignas(64) float rows[5 * kSkinRow];
+  kernels.skin_rows(matrices.values.data(), 5, rows);
+  const SkinRun run{10, 2};
+  std::vector<float> out(33, 7.0f);
+  kernels.skin(rows, {&run, 1, vertices.data(), bones.data(), weights.data()}, points.values.data(),
+               out.data());
+  return out;
+}
+
+TEST_P(SimdKernels, SkinTheVerticesOfTheirPartAlone) {
+  const std::vector<float> out = skinned(kernels_), wanted = skinned(scalar_kernels());
+  for (std::size_t i = 0; i < 30; ++i) EXPECT_NEAR(out[i], wanted[i], 1e-3f) << i;
+  for (std::size_t i = 30; i < 33; ++i) EXPECT_EQ(out[i], 7.0f);
+}
+
 INSTANTIATE_TEST_SUITE_P(Every, SimdKernels, testing::ValuesIn(all_kernels()),
                          [](const auto& about) { return about.param; });
 
 void expect_bits(const Kernels& a, const Kernels& b) {
+  EXPECT_EQ(skinned(a), skinned(b));
   std::mt19937 random(4);
   const Matrix<float> m = random_matrix(200, 200, random);
   const Matrix<std::uint16_t> half = halves(m);

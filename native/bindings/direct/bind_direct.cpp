@@ -276,7 +276,7 @@ void bind_direct(py::module_& m) {
         "float32[R]; lod; {mesh: where its vertices go}: a C-contiguous float32[V, 3], or "
         "(address, V) of such memory, which has to stay there until the call returns; turns "
         "float32[t, 4] w x y z or None, multiplied from the left to what the turned bones keep. "
-        "threads: at most so many, 0 is all cores; the result is the same.");
+        "threads 0: as many as the work is worth, at most all cores; the result is the same.");
   m.def("deform_faces", &deform_faces, py::arg("faces"), py::arg("joints"), py::arg("blend_shapes"),
         py::arg("targets"), py::kw_only(), py::arg("turns") = py::none(), py::arg("anew") = false,
         py::arg("threads") = 0,

@@ -1098,9 +1098,7 @@ class DirectFace:
         """rows int[n]: the bone of chain of each bone of space; base float32[V, 3] of each mesh."""
     @property
     def mesh_count(self) -> int: ...
-    def keep(
-        self, location: npt.ArrayLike, rotation: npt.ArrayLike, scale: npt.ArrayLike
-    ) -> None:
+    def keep(self, location: npt.ArrayLike, rotation: npt.ArrayLike, scale: npt.ArrayLike) -> None:
         """What the bones of the chain keep that are not in rows: [B, 3], [B, 4], [B, 3]."""
     def set_base(self, mesh: _Int, base: npt.ArrayLike) -> None: ...
     def forget(self) -> None:

@@ -120,7 +120,7 @@ class DirectFace {
 /// Evaluates a frame of each face, in as many threads as the work is worth. What is written does
 /// not depend on their number. In:  faces    different ones
 ///      frames   of each; what they write may not overlap
-///      threads  at most so many; 0: as many as there are cores
+///      threads  so many; 0: as many as the work is worth, and no more than there are cores
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads);
 

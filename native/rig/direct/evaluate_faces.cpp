@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <atomic>
+#include <system_error>
 #include <thread>
 
-#include "core/parallel_for.h"
 #include "rig/direct/direct_face.h"
 
 namespace risorius::rig {
 namespace {
 
-// Vertices that are worth a thread: to begin one takes as long as to skin so many.
+// To begin a thread takes as long as to skin so many vertices.
 constexpr std::size_t kWorthAThread = 8192;
+constexpr std::size_t kMostThreads = 64;
 
 // One list of work for all threads: first every face is begun, then come the blocks of its meshes.
 // Who takes a block waits until its face is begun: that is done by a thread that took it before.
+// Threads share it: the caller waits until all is done and not until each of them has begun, which
+// on a busy machine takes longer than a frame. One that comes late finds nothing left to take.
 class Work {
  public:
   Work(std::span<DirectFace* const> faces, std::span<FaceFrame> frames)
@@ -38,7 +41,13 @@ class Work {
       } else {
         write(i - faces_.size());
       }
+      done_.fetch_add(1, std::memory_order_release);
     }
+  }
+
+  void wait() const noexcept {
+    const std::size_t count = faces_.size() + blocks_;
+    while (done_.load(std::memory_order_acquire) != count) std::this_thread::yield();
   }
 
  private:
@@ -68,17 +77,27 @@ class Work {
   std::vector<std::atomic<bool>> begun_;
   std::vector<Mesh> meshes_;  // by their first block; those without blocks are never found
   std::size_t blocks_ = 0, vertices_ = 0;
-  std::atomic<std::size_t> next_{0};
+  std::atomic<std::size_t> next_{0}, done_{0};
 };
 
 }  // namespace
 
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads) {
-  Work work(faces, frames);
-  if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
-  threads = std::clamp<std::size_t>(work.vertices() / kWorthAThread, 1, threads);
-  core::parallel_for(threads, threads, [&](std::size_t, std::size_t) { work.run(); });
+  const auto work = std::make_shared<Work>(faces, frames);
+  if (threads == 0) {
+    threads = std::max(1u, std::thread::hardware_concurrency());
+    threads = std::clamp<std::size_t>(work->vertices() / kWorthAThread, 1, threads);
+  }
+  for (std::size_t t = 1; t < std::min(threads, kMostThreads); ++t) {
+    try {
+      std::thread([work] { work->run(); }).detach();
+    } catch (const std::system_error&) {  // the system has no more of them: there is this one
+      break;
+    }
+  }
+  work->run();
+  work->wait();
   for (std::size_t f = 0; f < faces.size(); ++f) {
     for (const Target& target : frames[f].targets) {
       if (target.written) faces[f]->end(target);

@@ -51,7 +51,7 @@ def _fill_unheard(
     for item in parts.meshes_of(rig):
         for slot in item.material_slots:
             if slot.material is not None and next(materials.map_drivers(slot.material), None):
-                slot.material.node_tree.update_tag()
+                compat.tree_of(slot.material).update_tag()
 
 
 def _fill(owner: bpy.types.Object, name: str, values: NDArray[np.float32]) -> bool:

@@ -83,6 +83,7 @@ def _is_rendered() -> bool:
 
 @persistent
 def _render_begins(*_arguments: object) -> None:
+    conditions.look_quickly()
     refresh(evaluate.Moment.ANEW)  # modes do not change while it runs
     _work.rendering = True
 

@@ -45,10 +45,18 @@ ORDINARY = Plan()  # as in a file: every mesh is deformed by its armature modifi
 
 @dataclass
 class _Kept:
-    """Attributes: plan; signature  see _signature; is_fresh  whether nothing was edited since."""
+    """How a face was when it was looked at.
+
+    Attributes:
+        plan: Plan.
+        signature: see _signature.
+        stacks: see _stacks.
+        is_fresh: whether nothing was edited since.
+    """
 
     plan: Plan
     signature: tuple[object, ...]
+    stacks: tuple[int, ...]
     is_fresh: bool = True
 
 
@@ -61,6 +69,8 @@ _writes = session.value("conditions.writes", 0, ("quit",))
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
 # Datablock that is no object -> number of its drivers when it was last updated.
 _drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
+# Objects of the user's -> what they point to, see _pointed.
+_pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
 # Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
@@ -75,9 +85,15 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
     if rig.session_uid in _ordinary:
         return ORDINARY
     kept = _kept.get(rig.session_uid)
-    if kept is None or not kept.is_fresh:
-        kept = _kept[rig.session_uid] = _Kept(look(rig, live), _signature(rig))
+    stacks = _stacks(rig)
+    if kept is None or not kept.is_fresh or kept.stacks != stacks:
+        kept = _kept[rig.session_uid] = _Kept(look(rig, live), _signature(rig), stacks)
     return kept.plan
+
+
+def _stacks(rig: ArmatureObject) -> tuple[int, ...]:
+    """How many modifiers each mesh has: a script may add a simulation and go to the next frame."""
+    return tuple(len(item.modifiers) for item in parts.meshes_of(rig))
 
 
 def known(rig: ArmatureObject) -> Plan | None:
@@ -173,8 +189,42 @@ class _Edits:
             if update.is_updated_geometry:
                 self.rigs.add(uid)
                 skins.forget_bones(uid)
-        elif parts.RIG not in item:
+        elif parts.RIG not in item and _may_read_anew(item):
             self.foreign = True
+
+
+def _may_read_anew(item: bpy.types.Object) -> bool:
+    """Whether an object of the user's points to other objects than when it was last looked at.
+
+    A lamp that is dragged is edited at each step, and reads no face.
+    """
+    if any(modifier.type == "NODES" for modifier in item.modifiers):
+        return True  # inputs of geometry nodes are objects, too
+    pointed = _pointed(item)
+    if _pointing.get(item.session_uid) == pointed:
+        return False
+    _pointing[item.session_uid] = pointed
+    return True
+
+
+def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
+    """What an object points to by parent, constraints, modifiers and drivers."""
+    bones = item.pose.bones if item.pose is not None else ()
+    holds = [*item.constraints, *(hold for bone in bones for hold in bone.constraints)]
+    targets = [
+        (_uid(getattr(hold, "target", None)), getattr(hold, "subtarget", "")) for hold in holds
+    ]
+    targets += [(_uid(t.target), t.subtarget) for h in holds for t in getattr(h, "targets", ())]
+    modifiers = [_uid(getattr(modifier, "object", None)) for modifier in item.modifiers]
+    data = item.animation_data
+    count = len(data.drivers) if data is not None else 0
+    parent = (_uid(item.parent), item.parent_type, item.parent_bone)
+    return parent, tuple(targets), tuple(modifiers), count
+
+
+def _uid(thing: object) -> int:
+    """The session uid of a datablock, 0 of anything else: no Blender object is kept."""
+    return thing.session_uid if isinstance(thing, bpy.types.ID) else 0
 
 
 def _has_other_drivers(item: bpy.types.ID) -> bool:

@@ -62,7 +62,7 @@ _skins: dict[int, Skin] = session.table("skins.skins", ("load",))
 _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
 
 
-@session.at("undo")
+@session.at("rewrite", "undo")
 def doubt() -> None:
     """Compare each skin with its mesh before it is used again: after undo, and before a frame."""
     _unsure.update(_skins)
@@ -113,7 +113,7 @@ def _holds(kept: Skin, item: MeshObject, bones: Bones) -> bool:
         if kept.names != bones.names:
             return False
         kept.names = bones.names
-    return item.session_uid not in _unsure or kept.mark == _mark(item)
+    return item.session_uid not in _unsure or _is_as_read(kept, item)
 
 
 def _read_bones(rig: ArmatureObject) -> Bones:
@@ -196,6 +196,10 @@ def _weights_of_groups(item: MeshObject, bones: Bones) -> _Weights:
     places = np.full(max(len(groups_there), int(groups.max(initial=-1)) + 1), -1, np.int64)
     places[: len(groups_there)] = [bones.names.get(group.name, -1) for group in groups_there]
     return counts, places[groups], weights
+
+
+def _is_as_read(skin: Skin, item: MeshObject) -> bool:
+    return skin.mark == _mark(item) and np.array_equal(skin.base, meshes.basis_of(item))
 
 
 def _mark(item: MeshObject) -> tuple[object, ...]:
