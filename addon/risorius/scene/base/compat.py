@@ -59,6 +59,14 @@ def driver_of(curve: bpy.types.FCurve) -> bpy.types.Driver:
     return curve.driver
 
 
+def uid_of(modifier: bpy.types.Modifier) -> int:
+    """What tells a modifier from the others of its object, also after it was renamed.
+
+    0 in a Blender that does not say it.
+    """
+    return int(getattr(modifier, "persistent_uid", 0))
+
+
 def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
     """What says whether a bone is selected: since 5.0 the pose bone."""
     return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone

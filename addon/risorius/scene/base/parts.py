@@ -33,7 +33,8 @@ LODS = "dna_lods"  # on a mesh object: the levels that show it
 JOINT = "dna_joint"  # on a bone: its number in the DNA
 HIDDEN_PREFIX = "risorius_"  # + flag, on a mesh: what was last written to the flag
 MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
-FINISHED = "risorius_finished"  # on a mesh object: it is in Direct mode now, see direct.py
+# On a mesh object: it is in Direct mode now, see direct.py; the persistent uid of the modifier.
+FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" where Direct is not wanted
 JOINTS_SHOWN = "risorius_joints_shown"  # on the same: its joints were shown in an older file
 VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from

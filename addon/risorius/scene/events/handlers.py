@@ -60,6 +60,8 @@ def _frame_changes(scene: bpy.types.Scene, *_arguments: object) -> None:
     if not _work.rendering and not native.problem():
         for controls in filter(None, map(parts.controls_of, parts.rigs())):
             tweak_guard.settle(controls)
+        if controls_ahead.is_edited():
+            conditions.look_at_tagged(scene)
     evaluate.before_frame(scene, _is_rendered())
 
 
@@ -69,7 +71,7 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
     if depsgraph is not None:
         timing.evaluated()
         evaluate.after_frame(depsgraph)
-    conditions.end_frame()
+    conditions.forget_written()
 
 
 def _is_rendered() -> bool:
@@ -134,6 +136,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
                     continue  # the evaluated copy knows of it only after the next update
                 evaluate.evaluate(rig, depsgraph)
     finally:
+        conditions.end_updates(depsgraph)
         _work.busy = False
 
 
@@ -304,6 +307,11 @@ def _before_save(*_arguments: object) -> None:
         refresh()
     repair.remove_dead()
     console.say(*sharing.share())
+    layer = current_context().view_layer
+    if layer is not None and ordinary.is_unknown(parts.rigs()):
+        layer.update()
+    if ordinary.is_unknown(parts.rigs()):
+        refresh(evaluate.Moment.ANEW)
     ordinary.take_on(parts.rigs())
 
 
@@ -381,6 +389,7 @@ def unregister() -> None:
         refresh()
     for rig in parts.rigs():
         ordinary.leave(rig)
+        rig.update_tag(refresh={"OBJECT"})
     for name, handler in reversed(_there()):
         present = getattr(bpy.app.handlers, name)
         if handler in present:

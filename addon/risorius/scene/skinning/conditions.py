@@ -14,13 +14,14 @@ import bpy
 import numpy as np
 
 from ...logic.base.sentences import Sentence, told
-from ..base import compat, drivers, parts, saved, session
+from ..base import compat, drivers, last_written, parts, saved, session
 from ..base.blender_types import ArmatureObject, Depsgraph, MeshObject
 from ..character import armatures, meshes, runtime
-from . import live_keys
+from . import live_keys, skins
 
 _PLACES = ("location", "rotation", "scale", "delta")  # how data paths of an object's place begin
 _STRAIGHT = 1e-6  # of a matrix's elements, from which a mesh counts as moved against its rig
+_PLAIN = (True, False, False, False, "")  # see _settings
 _FOREIGN_KINDS = (bpy.types.Object, bpy.types.NodeTree, bpy.types.Collection)
 
 
@@ -61,8 +62,13 @@ class _Kept:
 
 # Deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh objects that were written to since Blender last told of updates: these are no edits.
-_written: set[int] = session.keep("conditions.written", set, ("undo", "load"))
+# Mesh object -> number of the last write to it by us: an update that tells of it is no edit.
+_written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
+_writes = session.value("conditions.writes", 0, ("quit",))
+# Scene and view layer -> the last write that an update of its graph told of.
+_told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
+# Datablock that is no object -> number of its drivers when it was last updated.
+_drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
 # Objects of the user's -> what they point to, see _pointed.
 _pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
 # Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
@@ -123,12 +129,27 @@ def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
 
 def note_written(item: MeshObject) -> None:
     """A mesh is written to by us: the update that follows is no edit. Args: item  the mesh."""
-    _written.add(item.session_uid)
+    _writes.now += 1
+    _written[item.session_uid] = _writes.now
 
 
-def end_frame() -> None:
-    """A frame was evaluated: Blender does not tell of the updates that belong to it."""
+def forget_written() -> None:
+    """No update will tell of what was written: of a frame Blender evaluates it without a word."""
     _written.clear()
+
+
+def end_updates(depsgraph: Depsgraph) -> None:
+    """The handlers of an update end: what they wrote, Blender evaluates without a word.
+
+    Args:
+        depsgraph: whose update it is; those of other view layers tell of it later.
+    """
+    _told[_key_of(depsgraph)] = _writes.now
+
+
+def _key_of(depsgraph: Depsgraph) -> tuple[int, str]:
+    layer = depsgraph.view_layer
+    return depsgraph.scene.session_uid, layer.name if layer is not None else ""
 
 
 @dataclass
@@ -136,11 +157,13 @@ class _Edits:
     """What an edit concerns.
 
     Attributes:
+        told: the last write that the graph has told of before.
         meshes: session uids of meshes of characters that somebody else edited.
         rigs: session uids of edited deforming armatures, and of their data.
         foreign: whether an object was edited that belongs to no character.
     """
 
+    told: int
     meshes: set[int] = field(default_factory=set)
     rigs: set[int] = field(default_factory=set)
     foreign: bool = False
@@ -151,19 +174,21 @@ class _Edits:
             self.rigs.add(item.session_uid)
         elif isinstance(item, bpy.types.Object):
             self._add_object(update, item)
-        elif isinstance(item, _FOREIGN_KINDS):
-            self.foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+        else:
+            if isinstance(item, _FOREIGN_KINDS):
+                self.foreign |= getattr(item, "type", "GEOMETRY") == "GEOMETRY"
+            self.foreign |= _has_other_drivers(item)
 
     def _add_object(self, update: bpy.types.DepsgraphUpdate, item: bpy.types.Object) -> None:
         uid = item.session_uid
         if parts.MESH in item and parts.RIG in item:
-            ours = uid in _written
-            _written.discard(uid)
+            ours = _written.get(uid, 0) > self.told
             if not ours and (update.is_updated_geometry or update.is_updated_transform):
                 self.meshes.add(uid)
         elif parts.CONTROLS in item:
             if update.is_updated_geometry:
                 self.rigs.add(uid)
+                skins.forget_bones(uid)
         elif parts.RIG not in item and _may_read_anew(item):
             self.foreign = True
 
@@ -189,6 +214,7 @@ def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
     targets = [
         (_uid(getattr(hold, "target", None)), getattr(hold, "subtarget", "")) for hold in holds
     ]
+    targets += [(_uid(t.target), t.subtarget) for h in holds for t in getattr(h, "targets", ())]
     modifiers = [_uid(getattr(modifier, "object", None)) for modifier in item.modifiers]
     data = item.animation_data
     count = len(data.drivers) if data is not None else 0
@@ -201,6 +227,15 @@ def _uid(thing: object) -> int:
     return thing.session_uid if isinstance(thing, bpy.types.ID) else 0
 
 
+def _has_other_drivers(item: bpy.types.ID) -> bool:
+    """Whether a datablock has more or fewer drivers than at its last update."""
+    data = getattr(item, "animation_data", None)
+    count = len(data.drivers) if data is not None else 0
+    was = _drivers.get(item.session_uid, 0)
+    _drivers[item.session_uid] = count
+    return count != was
+
+
 def note_updates(depsgraph: Depsgraph) -> set[int]:
     """Look which plans an edit may have changed.
 
@@ -210,7 +245,7 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
     Returns:
         Session uids of meshes that somebody else than this add-on edited.
     """
-    edits = _Edits()
+    edits = _Edits(_told.get(_key_of(depsgraph), 0))
     for update in depsgraph.updates:
         item = update.id.original if update.id is not None else None
         if item is not None:
@@ -222,6 +257,8 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         own = {item.session_uid for item in parts.meshes_of(rig)} & edits.meshes
         armature = edits.rigs & {rig.session_uid, rig.data.session_uid}
         kept.is_fresh = not (edits.foreign or armature or own)
+        if own or armature:
+            last_written.inputs.pop(rig.session_uid, None)  # of other weights, or another rest form
     look_quickly()
     return edits.meshes
 
@@ -232,6 +269,29 @@ def look_quickly() -> None:
         kept = _kept.get(rig.session_uid)
         if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
             kept.is_fresh = False
+            last_written.inputs.pop(rig.session_uid, None)
+
+
+_TAGGED = ("OBJECT", "MESH", "KEY", "ARMATURE", "COLLECTION", "SCENE")
+
+
+def look_at_tagged(scene: bpy.types.Scene) -> None:
+    """Before a frame: look at what a script has edited since the last update of a scene.
+
+    Without an interface Blender tells of it only with the frame, among all that is animated.
+
+    Args:
+        scene: the original.
+    """
+    graphs = [layer.depsgraph for layer in scene.view_layers if layer.depsgraph is not None]
+    tagged = {kind for kind in _TAGGED for graph in graphs if graph.id_type_updated(kind)}
+    if not tagged:
+        return
+    look_quickly()
+    if "MESH" in tagged:
+        skins.doubt()
+        for rig in parts.rigs():
+            last_written.inputs.pop(rig.session_uid, None)
 
 
 def stale(rig: ArmatureObject) -> bool:
@@ -250,7 +310,9 @@ def _signature(rig: ArmatureObject) -> tuple[object, ...]:
 def _mesh_signature(item: MeshObject) -> tuple[object, ...]:
     data, key = item.data, item.data.shape_keys
     stack = tuple((m.name, m.show_viewport, m.show_render) for m in item.modifiers)
+    own = next((m for m in item.modifiers if isinstance(m, bpy.types.ArmatureModifier)), None)
     first = (item.mode, stack, data.users, len(data.vertices), len(item.constraints))
+    first += () if own is None else _settings(own)
     if key is None:
         return (*first, item.get(parts.MODE))
     blocks = key.key_blocks
@@ -259,6 +321,11 @@ def _mesh_signature(item: MeshObject) -> tuple[object, ...]:
     blocks.foreach_get("mute", mutes)
     pinned = item.show_only_shape_key, item.active_shape_key_index, key.use_relative
     return (*first, values.tobytes(), mutes.tobytes(), *pinned)
+
+
+def _settings(own: bpy.types.ArmatureModifier) -> tuple[object, ...]:
+    flags = own.use_vertex_groups, own.use_bone_envelopes, own.use_deform_preserve_volume
+    return (*flags, own.use_multi_modifier, own.vertex_group)
 
 
 def look(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
@@ -381,30 +448,40 @@ def _curves(owner: bpy.types.Object | bpy.types.Key) -> Iterator[bpy.types.FCurv
 
 
 def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModifier | None:
-    """The armature modifier through which a rig deforms a mesh: the first one.
+    """The armature modifier through which a rig deforms a mesh.
 
     Args:
         item: the mesh.
         rig: the deforming armature.
+
+    Returns:
+        In Direct mode the one that was disabled by us, whatever it points to now; else the first
+        of this rig.
     """
+    marked = saved.whole(item, parts.FINISHED, 0)
+    own = None
     for modifier in item.modifiers:
-        if isinstance(modifier, bpy.types.ArmatureModifier) and modifier.object == rig:
-            return modifier
-    return None
+        if isinstance(modifier, bpy.types.ArmatureModifier):
+            if marked and compat.uid_of(modifier) == marked:
+                return modifier
+            if own is None and modifier.object == rig:
+                own = modifier
+    return own
 
 
 def _modifiers(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
     """Whether our armature modifier is the first that is enabled, and as it was built."""
     own = armature_of(item, rig)
-    if own is None:
+    if own is None or own.object != rig:
         yield told("{mesh} has no armature modifier of {rig}.", mesh=item.name, rig=rig.name)
         return
+    kin = (m for m in item.modifiers if isinstance(m, bpy.types.ArmatureModifier) and m != own)
+    if any(modifier.object == rig for modifier in kin):
+        yield told("{mesh} has several armature modifiers of {rig}.", mesh=item.name, rig=rig.name)
     enabled = own.show_viewport and own.show_render
     if not enabled and parts.FINISHED not in item:
         yield told("The armature modifier of {mesh} is disabled.", mesh=item.name)
-    plain = own.use_vertex_groups and not own.use_bone_envelopes
-    plain = plain and not own.use_deform_preserve_volume and not own.use_multi_modifier
-    if not plain or own.vertex_group:
+    if _settings(own) != _PLAIN:
         yield told("The armature modifier of {mesh} was changed.", mesh=item.name)
     for modifier in item.modifiers:
         if modifier == own:

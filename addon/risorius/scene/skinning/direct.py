@@ -17,7 +17,7 @@ from mathutils import Quaternion
 from numpy.typing import NDArray
 
 from ... import native
-from ..base import last_written, parts, session
+from ..base import compat, last_written, parts, session
 from ..base.blender_types import ArmatureObject, MeshObject
 from ..character import meshes, runtime
 from . import bone_writer, conditions, skins
@@ -90,7 +90,7 @@ class Job:
 
 
 # Deforming armature -> the Frame that was last written; what is compiled of the face.
-_shown: dict[int, Frame] = session.table("direct.shown", ("rewrite", "undo", "load"))
+_shown: dict[int, Frame] = session.table("direct.shown", ("undo", "load"))
 _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
 
 
@@ -131,10 +131,10 @@ def take(item: MeshObject, rig: ArmatureObject) -> None:
     """
     if meshes.live_block(item) is None:
         meshes.add_live_key(item)
-    item[parts.FINISHED] = True
     own = conditions.armature_of(item, rig)
-    assert own is not None
-    own.show_viewport = own.show_render = False
+    if own is not None:
+        item[parts.FINISHED] = compat.uid_of(own)
+        own.show_viewport = own.show_render = False
     _forget(item)
 
 
@@ -145,25 +145,42 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
         item: the mesh object.
         rig: deforming armature; the live key is written afterwards.
     """
-    item.pop(parts.FINISHED, None)
     own = conditions.armature_of(item, rig)
+    item.pop(parts.FINISHED, None)
     if own is not None:
         own.show_viewport = own.show_render = True
     if item.mode == "EDIT":
-        _reset_edited(item)
+        _reset_edited(item, rig)
     _forget(item)
 
 
-def _reset_edited(item: MeshObject) -> None:
-    """Give the live key of a mesh in edit mode the neutral form: leaving the mode stores it."""
+def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
+    """float32[V, 3], what the live key of a mesh has in Live mode; None without keys.
+
+    Args:
+        item: the mesh object.
+        rig: deforming armature, as it was last shown.
+    """
+    key, frame = item.data.shape_keys, shown(rig)
+    if key is None:
+        return None
+    rest = meshes.points_of(key.reference_key)
+    if frame is None or len(rest) != frame.live.vertex_count(item[parts.MESH]):
+        return rest
+    return frame.live.morph(item[parts.MESH]).evaluate(frame.shape.weights, base=rest)
+
+
+def _reset_edited(item: MeshObject, rig: ArmatureObject) -> None:
+    """Give the live key of a mesh in edit mode its rest form: leaving the mode stores it."""
     edit, block = bmesh.from_edit_mesh(item.data), meshes.live_block(item)
     layers: Any = edit.verts.layers.shape
-    key = item.data.shape_keys
-    if block is None or key is None or block.name not in layers.keys():  # noqa: SIM118  no dict
+    rest = rest_form(item, rig)
+    if block is None or rest is None or block.name not in layers.keys():  # noqa: SIM118  no dict
         return
-    live, base = layers[block.name], layers[key.reference_key.name]
-    for vertex in edit.verts:
-        vertex[live] = vertex[base]
+    live = layers[block.name]
+    if len(rest) == len(edit.verts):
+        for vertex, place in zip(edit.verts, rest.tolist(), strict=True):
+            vertex[live] = place
 
 
 def _forget(item: MeshObject) -> None:

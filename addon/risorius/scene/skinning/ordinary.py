@@ -41,22 +41,27 @@ def leave(rig: ArmatureObject) -> None:
     frame, found = direct.shown(rig), _finished_meshes(rig)
     if not found:
         return
-    if frame is not None:
+    if frame is not None and frame.writer.count == len(rig.pose.bones):
         bone_writer.write(rig, frame.live, frame.shape.joints, frame.shape.turns, None)
         rig.update_tag(refresh={"OBJECT"})
     for item in found:
         direct.give_back(item, rig)
-        block, key = meshes.live_block(item), item.data.shape_keys
-        if block is None or key is None:
+        block, rest = meshes.live_block(item), direct.rest_form(item, rig)
+        if block is None or rest is None or len(rest) != len(block.points):
             continue
-        rest = meshes.points_of(key.reference_key)
-        if frame is not None and len(rest) == frame.live.vertex_count(item[parts.MESH]):
-            morph = frame.live.morph(item[parts.MESH])
-            rest = morph.evaluate(frame.shape.weights, base=rest)
         block.points.foreach_set("co", rest.ravel())
         conditions.note_written(item)
         item.data.update_tag()
     last_written.inputs.pop(rig.session_uid, None)
+
+
+def is_unknown(rigs: Iterable[ArmatureObject]) -> bool:
+    """Whether the form of a face in files is not known, as between undo and the next update.
+
+    Args:
+        rigs: deforming armatures.
+    """
+    return any(direct.shown(rig) is None and _finished_meshes(rig) for rig in rigs)
 
 
 def _finished_meshes(rig: ArmatureObject) -> list[MeshObject]:

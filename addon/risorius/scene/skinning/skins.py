@@ -46,12 +46,14 @@ class Skin:
         skin: risorius.Skin of its vertex groups.
         base: float32[V, 3], its reference key.
         mark: see _mark.
+        names: those of the Bones that it was compiled for.
     """
 
     mesh: int
     skin: native.Skin
     base: NDArray[np.float32]
     mark: tuple[object, ...]
+    names: dict[str, int]
 
 
 # Deforming armature -> Bones; mesh object -> Skin.
@@ -62,7 +64,7 @@ _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
 
 @session.at("rewrite", "undo")
 def doubt() -> None:
-    """After undo, or another file's data, a skin is compared with its mesh before it is used."""
+    """Compare each skin with its mesh before it is used again: after undo, and before a frame."""
     _unsure.update(_skins)
 
 
@@ -73,9 +75,9 @@ def forget(uids: set[int]) -> None:
         meshes.note_edit(uid)
 
 
-def forget_bones(rig: ArmatureObject) -> None:
-    """Bones of an armature were edited. Args: rig  deforming armature."""
-    _bones.pop(rig.session_uid, None)
+def forget_bones(uid: int) -> None:
+    """Bones of an armature were edited or posed. Args: uid  of the deforming armature."""
+    _bones.pop(uid, None)
 
 
 def bones_of(rig: ArmatureObject) -> Bones:
@@ -96,12 +98,22 @@ def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     """
     uid = item.session_uid
     kept = _skins.get(uid)
-    if kept is not None and uid in _unsure and not _is_as_read(kept, item):
+    if kept is not None and not _holds(kept, item, bones):
         kept = None
+        meshes.note_edit(uid)
     _unsure.discard(uid)
     if kept is None:
         kept = _skins[uid] = _read_skin(item, bones, live)
     return kept
+
+
+def _holds(kept: Skin, item: MeshObject, bones: Bones) -> bool:
+    """Whether the skin of a mesh is still that of its vertex groups and these bones."""
+    if kept.names is not bones.names:
+        if kept.names != bones.names:
+            return False
+        kept.names = bones.names
+    return item.session_uid not in _unsure or _is_as_read(kept, item)
 
 
 def _read_bones(rig: ArmatureObject) -> Bones:
@@ -146,7 +158,7 @@ def _read_skin(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
     skin = native.module().Skin(
         count, offsets, places[kept].astype(np.uint32), weights[kept], len(bones.names)
     )
-    return Skin(item[parts.MESH], skin, meshes.basis_of(item), _mark(item))
+    return Skin(item[parts.MESH], skin, meshes.basis_of(item), _mark(item), bones.names)
 
 
 _Weights = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]

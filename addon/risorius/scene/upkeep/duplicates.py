@@ -68,6 +68,8 @@ def _own_mesh(item: MeshObject) -> list[str]:
     users = [o for o in bpy.data.objects if o.data == item.data]
     if len(users) < 2 or users[0] == item or item.library or item.data.library:
         return []
+    if parts.FINISHED in item:
+        ordinary.leave(item[parts.RIG])  # the other object is nobody's to bring back
     item.data = item.data.copy()
     return [f"{item.name} was given a mesh of its own: two faces cannot share live shapes."]
 

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One face in Direct mode beside the same in Live mode, where Blender deforms it."""
+
+import bpy
+import numpy as np
+
+from . import scene
+
+NEAR = 1e-5  # of the face's size
+
+
+def plan(rig):
+    """How a face was last shown: conditions.Plan."""
+    return scene.submodule("scene.skinning.conditions").known(rig)
+
+
+def is_direct(rig, *numbers):
+    """Whether meshes of a face, or all, have finished positions and disabled modifiers."""
+    items = scene.meshes(rig)
+    wanted = [items[n] for n in numbers or items]
+    off = all(not m.modifiers[0].show_viewport for m in wanted)
+    return off and all(m.session_uid in plan(rig).direct for m in wanted)
+
+
+def normals(item):
+    """float64[C, 3] of the corners of the mesh that Blender shows; bool[C] which of them count.
+
+    Where faces of opposite sides meet, as in the teeth of coarse levels, there is no normal.
+    """
+    seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = seen.to_mesh()
+    corners, faces = len(mesh.loops), len(mesh.polygons)
+    flat, sides = np.empty(corners * 3, np.float32), np.empty(faces * 3, np.float32)
+    points, sizes = np.empty(corners, np.int32), np.empty(faces, np.int32)
+    mesh.corner_normals.foreach_get("vector", flat)
+    mesh.polygons.foreach_get("normal", sides)
+    mesh.polygons.foreach_get("loop_total", sizes)
+    mesh.loops.foreach_get("vertex_index", points)
+    mean = np.zeros((len(mesh.vertices), 3))
+    np.add.at(mean, points, np.repeat(sides.reshape(-1, 3), sizes, axis=0))
+    mean /= np.maximum(np.bincount(points, minlength=len(mean)), 1)[:, None]
+    seen.to_mesh_clear()
+    there = np.linalg.norm(mean, axis=1)[points] > 0.1
+    return flat.reshape(-1, 3).astype(np.float64), there
+
+
+def bones(rig):
+    """float64[B, 4, 4], the posed matrices that Blender has of the deforming armature."""
+    seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
+    flat = np.empty(len(seen) * 16, np.float32)
+    seen.foreach_get("matrix", flat)
+    return flat.reshape(-1, 4, 4).astype(np.float64)
+
+
+def settle():
+    """Let Blender evaluate edits, and what the add-on writes after them."""
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.update()
+
+
+class Pair:
+    """The face of a file twice.
+
+    Attributes:
+        direct, live: deforming armatures of the face in Direct mode, and of the one in Live mode.
+    """
+
+    def __init__(self, path, **options):
+        self.direct = scene.load(path, **options)
+        self.live = scene.load(path, "LIVE", **options)
+        scene.controls(self.live).location = scene.controls(self.direct).location
+        bpy.ops.object.select_all(action="DESELECT")
+        settle()
+
+    def each(self):
+        return self.direct, self.live
+
+    def set(self, **values):
+        """Set sliders of both faces."""
+        for rig in self.each():
+            scene.set_controls(rig, **values)
+        settle()
+
+    def edit(self, change):
+        """Make one edit of both faces. Args: change  function of a rig and its head mesh."""
+        done = [change(rig, scene.meshes(rig)[0]) for rig in self.each()]
+        settle()
+        return done
+
+    def apart(self, lod=0):
+        """The largest distance between meshes as seen from their rigs, over the face's size."""
+        found = []
+        for rig in self.each():
+            place = np.linalg.inv(np.array(rig.matrix_world))
+            items = [m for _, m in sorted(scene.meshes(rig).items()) if lod in list(m["dna_lods"])]
+            found.append([scene.evaluated(m) @ place[:3, :3].T + place[:3, 3] for m in items])
+        size = max(np.ptp(points, axis=0).max() for points in found[1])
+        pairs = list(zip(*found, strict=True))
+        assert all(len(a) == len(b) for a, b in pairs), [(len(a), len(b)) for a, b in pairs]
+        return max(float(np.abs(a - b).max()) for a, b in pairs) / size
+
+    def bones_apart(self):
+        """The largest difference of posed bones: of elements of their matrices."""
+        return float(np.abs(bones(self.direct) - bones(self.live)).max())
+
+    def check(self, near=NEAR):
+        """Both show the same, and do so when they move."""
+        for values in ((0.9, 0.2), (0.3, 0.8)):
+            self.set(jawOpen=values[0], mouthCornerPullL=values[1])
+            assert self.apart() < near
