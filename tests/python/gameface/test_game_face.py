@@ -6,9 +6,9 @@ with what is tried. packaging/ship/gameface.sh tries three.js and gltf-validator
 
 import json
 import re
-from pathlib import Path
 
 import dna_bytes
+import gameface_take
 import numpy as np
 import pytest
 import risorius
@@ -139,7 +139,8 @@ def test_the_driver_brings_sums_of_two_to_the_rig(face, tmp_path):
     rest = surface.positions(rig.initial_raw_controls, mesh) / 100
     at_rest = found.positions(HEAD)
     nearest = np.array([np.square(rest - p).sum(axis=1).argmin() for p in at_rest])
-    for row in [r for r in rows if r["target"] in found.names(HEAD)][:6]:
+    plain = [r for r in rows if r["weight"] in ("product", "half") and "mouthClose" not in r["of"]]
+    for row in [r for r in plain if r["target"] in found.names(HEAD)][:6]:
         share = 0.5 if row["weight"] == "half" else 1.0
         raw = rig.initial_raw_controls.copy()
         for name in row["of"]:
@@ -230,11 +231,7 @@ def test_a_texture_of_16_384_pixels_is_left_out_with_a_line(face, tmp_path, caps
 @pytest.mark.skipif(
     not (TAKE.exists() and SAMPLE.exists()), reason="EXTRA NOT RUN: no real take, or no sample"
 )
-def test_sums_follow_a_real_take_as_far_as_the_page_says(tmp_path):
-    from gameface_take import frames  # the sample is large: a coarse level and few frames
-
-    rows = frames(SAMPLE, TAKE, tmp_path, lod=4, every=400)
-    assert len(rows) > 5
-    plain, driven = (np.array([row[k] for row in rows]) for k in ("sum", "driven"))
-    assert driven.mean() < plain.mean()
-    assert Path(tmp_path / "face.glb").exists()
+def test_the_driver_brings_frames_of_a_real_take_nearer_to_the_rig():
+    away = gameface_take.frames(SAMPLE, TAKE, lod=4, every=400)
+    assert len(away) > 5
+    assert away[:, 1].mean() < away[:, 0].mean() / 1.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far sums of morph targets are from the rig on the frames of a take."""
+"""Sums of morph targets as a client shows them, against the rig at the same pose."""
 
 import json
 
@@ -9,6 +9,7 @@ from gltf_oracle import GlbFile
 from risorius import importing
 from risorius.controls import arkit
 from risorius.gameface import Wishes, export
+from risorius.gameface.targets import find_targets
 
 
 def units_of(take):
@@ -23,53 +24,79 @@ def driven(weights, table):
     """Weights with those of the combinations, as combinations.js sets them."""
     out = dict(weights)
     for row in table["combinations"]:
-        inside = np.clip([weights[name] for name in row["of"]], 0, 1)
-        half = row["weight"] == "half"
-        out[row["target"]] = float(4 * inside[0] * (1 - inside[0]) if half else np.prod(inside))
+        a, b = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0)[:2]
+        kinds = {
+            "product": a * b, "half": 4 * a * (1 - a), "below": 4 * a * (1 - b),
+            "share": 4 * a * max(0, b - a),
+        }  # fmt: skip
+        out[row["target"]] = float(kinds[row["weight"]])
     return out
 
 
-def frames(path, take, folder, *, lod=1, every=100, wishes=None):
-    """For each looked-at frame: its number, mm of the sum and of the driven sum against the rig."""
-    dna, rig = risorius.load(path), risorius.compile_cached(path)
-    wishes = wishes or Wishes(shapes=("arkit",), lod=lod, within=0.5)
-    result = export(dna, rig, path, "face.glb", wishes)
-    for name, data in result.files.items():
-        (folder / name).write_bytes(data)
-    table = json.loads(result.files["face.combinations.json"])
-    found = GlbFile(result.files["face.glb"])
-    clip, _ = importing.import_file(take, rig.raw_control_names, mapping="arkit")
-    surface = risorius.Surface(dna, rig, lod)
-    of_name = {name: i for i, name in enumerate(dna.mesh_names)}
-    deltas, where, rest = {}, {}, {}
-    for mesh in found.meshes():
-        names = found.names(mesh)
-        if names:
-            rest[mesh] = found.positions(mesh)
-            deltas[mesh] = np.stack([found.positions(mesh, {n: 1.0}) - rest[mesh] for n in names])
-            own = surface.positions(rig.initial_raw_controls, of_name[mesh]).astype(float) / 100
-            where[mesh] = nearest(own, rest[mesh])
-    out, column = [], {n: i for i, n in enumerate(rig.raw_control_names)}
-    units = units_of(take)
-    for frame in range(0, len(units), every):
-        raw = rig.initial_raw_controls.copy()
+class Posed:
+    """The meshes of a .glb at weights, and the rig's meshes in the same order at raw controls."""
+
+    def __init__(self, dna, rig, found, lod):
+        self.rig, self.found = rig, found
+        self._surface = risorius.Surface(dna, rig, lod)
+        self._number = {name: i for i, name in enumerate(dna.mesh_names)}
+        self._rest, self._deltas, self._where = {}, {}, {}
+        for mesh in found.meshes():
+            self._rest[mesh] = rest = found.positions(mesh)
+            deltas = [found.positions(mesh, {name: 1.0}) - rest for name in found.names(mesh)]
+            self._deltas[mesh] = np.array(deltas).reshape(-1, *rest.shape)
+            self._where[mesh] = _nearest(self._own(mesh, rig.initial_raw_controls), rest)
+
+    def targets(self, groups):
+        """As the export finds them."""
+        return find_targets(self.rig, groups, "the face")[0]
+
+    def sum(self, weights):
+        """Mesh -> float64[V, 3], metres: the neutral and the targets by their weights."""
+        out = {}
+        for mesh, deltas in self._deltas.items():
+            on = np.array([weights.get(name, 0.0) for name in self.found.names(mesh)])
+            out[mesh] = self._rest[mesh] + np.tensordot(on, deltas, 1)
+        return out
+
+    def rig_at(self, raw):
+        """The same, of the evaluated rig."""
+        return {mesh: self._own(mesh, raw)[where] for mesh, where in self._where.items()}
+
+    def raws_of(self, take):
+        """float32[frames, R] of a take, mapped as clips are."""
+        clip, _ = importing.import_file(take, self.rig.raw_control_names, mapping="arkit")
+        raws = np.tile(self.rig.initial_raw_controls, (clip.frame_count, 1))
+        column = {name: i for i, name in enumerate(self.rig.raw_control_names)}
         for name, curve in zip(clip.names, clip.curves, strict=True):
             if name in column:
-                raw[column[name]] = curve[frame]
-        row = {"frame": frame}
-        for key, weights in (("sum", units[frame]), ("driven", driven(units[frame], table))):
-            worst = 0.0
-            for mesh, delta in deltas.items():
-                on = np.array([weights.get(n, 0.0) for n in found.names(mesh)])
-                client = rest[mesh] + np.tensordot(on, delta, 1)
-                own = surface.positions(raw, of_name[mesh]).astype(float)[where[mesh]] / 100
-                worst = max(worst, 1000 * float(np.linalg.norm(client - own, axis=1).max()))
-            row[key] = worst
-        out.append(row)
-    return out
+                raws[:, column[name]] = curve
+        return raws
+
+    def _own(self, mesh, raw):
+        # The sample's axes are those of glTF; its unit is the centimetre.
+        return self._surface.positions(raw, self._number[mesh]).astype(np.float64) / 100
 
 
-def nearest(points, wanted):
+def frames(path, take, *, lod, every):
+    """For each looked-at frame: mm of the sum, and of the driven sum, against the rig."""
+    dna, rig = risorius.load(path), risorius.compile_cached(path)
+    made = export(dna, rig, path, "face.glb", Wishes(shapes=("arkit",), lod=lod, within=0.5))
+    table = json.loads(made.files["face.combinations.json"])
+    posed = Posed(dna, rig, GlbFile(made.files["face.glb"]), lod)
+    units, raws, out = units_of(take), posed.raws_of(take), []
+    for frame in range(0, len(units), every):
+        own = posed.rig_at(raws[frame])
+        sums = (posed.sum(units[frame]), posed.sum(driven(units[frame], table)))
+        out.append([_apart(own, one) for one in sums])
+    return np.array(out)
+
+
+def _apart(a, b):
+    return max(1000 * float(np.linalg.norm(a[n] - b[n], axis=1).max()) for n in a)
+
+
+def _nearest(points, wanted):
     """int64[n]: of each wanted place the point that is there; points of one place move alike."""
     out = np.empty(len(wanted), np.int64)
     for begin in range(0, len(wanted), 256):

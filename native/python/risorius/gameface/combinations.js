@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Adds what a face does where morph targets do not add up: targets that are on together, and
-// targets that are half on. Works with three.js, three-vrm and whatever else has objects with
+// Adds what a face does where morph targets do not add up: targets that are on together, targets
+// that are half on, and targets that act on top of another one, as mouthClose does on jawOpen. Works with three.js, three-vrm and whatever else has objects with
 // `morphTargetDictionary` and `morphTargetInfluences`.
 //
 //   import { Combinations } from './combinations.js';
@@ -10,12 +10,17 @@
 
 const FORMAT = 'risorius.combinations';
 const VERSION = 1;
+const KINDS = {
+  product: { drivers: 2, weight: (a, b) => a * b },
+  half: { drivers: 1, weight: (a) => 4 * a * (1 - a) },
+  below: { drivers: 2, weight: (a, b) => 4 * a * (1 - b) },
+  share: { drivers: 2, weight: (a, b) => 4 * a * Math.max(0, b - a) },
+};
 
 /** The weight of a combination's target, 0 to 1, from the weights of those that drive it. */
 export function weightOf(kind, weights) {
   const inside = weights.map((w) => Math.min(1, Math.max(0, w)));
-  if (kind === 'half') return 4 * inside[0] * (1 - inside[0]);
-  return inside.reduce((product, w) => product * w, 1);
+  return KINDS[kind].weight(...inside);
 }
 
 /** Refuses what is no table of combinations; returns its rows. */
@@ -25,12 +30,13 @@ export function rowsOf(table) {
     throw new Error(`combinations: version ${VERSION} was expected, found ${table.version}`);
   }
   for (const { target, of, weight } of table.combinations) {
-    const many = weight === 'half' ? 1 : 2;
-    if (typeof target !== 'string' || !Array.isArray(of) || of.length < many) {
-      throw new Error(`combinations: ${target}: the targets that drive it were expected`);
+    if (!Object.hasOwn(KINDS, weight)) {
+      const known = Object.keys(KINDS).join(', ');
+      throw new Error(`combinations: ${target}: a weight of ${known} was expected, found ${weight}`);
     }
-    if (weight !== 'half' && weight !== 'product') {
-      throw new Error(`combinations: ${target}: weight half or product was expected, found ${weight}`);
+    const many = KINDS[weight].drivers;
+    if (typeof target !== 'string' || !Array.isArray(of) || of.length !== many) {
+      throw new Error(`combinations: ${target}: ${many} targets that drive it were expected`);
     }
   }
   return table.combinations;

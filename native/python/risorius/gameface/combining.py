@@ -18,7 +18,10 @@ from .targets import Target
 Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
-PRODUCT, HALF = "product", "half"
+PRODUCT, HALF, BELOW, SHARE = "product", "half", "below", "share"
+"""How a combination's weight comes of a and b that drive it: a b; 4 a (1 - a); and where a acts on
+top of b, as mouthClose does on jawOpen: 4 a (1 - b), which counts where both are half on, and
+4 a (b - a), which counts where a is half of what b is."""
 _LEAST = 2e-6  # metres: what a target moves less, it does not move
 _TRIED = 2000  # pairs of a group: of more, as many that are spread evenly
 
@@ -30,7 +33,7 @@ class Combination:
     Attributes:
         name: of its morph target.
         of: the targets that drive it.
-        weight: PRODUCT of theirs, or HALF: 4 w (1 - w) of the one.
+        weight: PRODUCT, HALF, BELOW or SHARE.
         error_mm: the largest deviation of the linear sum without it.
     """
 
@@ -68,7 +71,7 @@ class Sums:
 
     def combination(self, one: Combination) -> Floats:
         """float32[P, 3], metres, of a combination's morph target."""
-        found = self._missing(one.of)
+        found = self._missing(one.weight, one.of)
         found[np.abs(found).max(axis=1) < _LEAST] = 0.0
         return found.astype(np.float32)
 
@@ -76,27 +79,31 @@ class Sums:
         """Pairs of a group, and its targets half on, the largest deviation first.
 
         Args:
-            group: of the targets. Of those that act on top of another one no pair is tried.
+            group: of the targets.
         """
         mine = [t for t in self._targets.values() if t.group == group and self._moves(t)]
-        alone = [t for t in mine if not t.needs]
-        pairs = [(a, b) for a, b in combinations(alone, 2) if not self._opposed(a, b)]
+        pairs = [(a, b) for a, b in combinations(mine, 2) if self._meet(a, b)]
         every = max(1, -(-len(pairs) // _TRIED))
         self.tried[group] = (len(pairs[::every]), len(pairs))
-        wholes = [(t.name,) for t in alone] + [(a.name, b.name) for a, b in pairs[::every]]
-        out = [
-            Combination(
-                "_x_".join(of) if len(of) > 1 else of[0] + "_half", of,
-                PRODUCT if len(of) > 1 else HALF,
-                1000.0 * float(np.sqrt(np.square(self._missing(of)).sum(axis=1).max(initial=0.0))),
-            )
-            for of in wholes
-        ]  # fmt: skip
+        wanted: list[tuple[str, tuple[str, ...]]] = [
+            (PRODUCT, (a.name, b.name)) for a, b in pairs[::every]
+        ]
+        for t in mine:
+            kinds = [(kind, (t.name, t.needs)) for kind in (BELOW, SHARE)]
+            wanted += kinds if t.needs else [(HALF, (t.name,))]
+        out = list[Combination]()
+        for kind, of in wanted:
+            name = "_x_".join(of) if kind == PRODUCT else f"{of[0]}_{kind}"
+            away = np.sqrt(np.square(self._missing(kind, of)).sum(axis=1).max(initial=0.0))
+            out.append(Combination(name, of, kind, 1000.0 * float(away)))
         return sorted(out, key=lambda one: -one.error_mm)
 
-    def _missing(self, of: tuple[str, ...]) -> Doubles:
-        """What the linear sum lacks where targets are on together, or the one is half on."""
-        share = 1.0 if len(of) > 1 else 0.5
+    def _missing(self, kind: str, of: tuple[str, ...]) -> Doubles:
+        """What the linear sum lacks where targets are on as their weight counts most."""
+        top = next((t for t in map(self._targets.__getitem__, of) if t.needs), None)
+        if top is not None:
+            return self._missing_on_top(kind, top, of)
+        share = 1.0 if kind == PRODUCT else 0.5
         raw = self._rest + np.float32(share) * sum(
             (self._targets[name].raw - self._rest for name in of), np.zeros_like(self._rest)
         )
@@ -105,13 +112,30 @@ class Sums:
         )
         return self._points.at(np.clip(raw, -1.0, 1.0)) - linear
 
+    def _missing_on_top(self, kind: str, top: Target, of: tuple[str, ...]) -> Doubles:
+        """The same of one that acts on top of another: its raw controls are shares of that one."""
+        below, on, share = top.base, np.float32(1.0), 0.5
+        if kind == BELOW:
+            below = self._rest + np.float32(0.5) * (top.base - self._rest)
+        elif kind == SHARE:
+            on = np.float32(0.5)
+        else:
+            other = self._targets[next(name for name in of if name != top.name)]
+            below, share = top.base + other.raw - self._rest, 1.0
+        above = below + on * (top.raw - top.base)
+        ends = [self._points.at(np.clip(raw, -1.0, 1.0)) for raw in (above, below)]
+        return np.asarray(ends[0] - ends[1] - share * self.delta(top.name), np.float64)
+
     def _moves(self, target: Target) -> bool:
         return bool((target.raw != target.base).any())
 
-    def _opposed(self, a: Target, b: Target) -> bool:
-        """Whether both look, shift or turn the same thing to opposite sides, as no face does."""
+    def _meet(self, a: Target, b: Target) -> bool:
+        """Whether a face does both: not where they look, shift or turn to opposite sides; and one
+        on top of the other is what it is."""
+        if a.name == b.needs or b.name == a.needs:
+            return False
         on = [[self._names[i] for i in np.flatnonzero(t.raw != self._rest)] for t in (a, b)]
-        return any(frozenset((x, y)) in self._against for x in on[0] for y in on[1])
+        return not any(frozenset((x, y)) in self._against for x in on[0] for y in on[1])
 
 
 def chosen(found: Sequence[Combination], within_mm: float, most: int) -> list[Combination]:
