@@ -73,10 +73,11 @@ class Points:
         self.axes = axes_of(dna)
         self.rest = self.at(np.asarray(rig.initial_raw_controls, np.float32))
         starts = np.concatenate([[0], np.cumsum(counts)])
-        self.parts = [
+        made = [
             self._part(dna.mesh_names[m], dna.meshes[m], int(start), skeleton)
             for m, start in zip(meshes, starts[:-1], strict=True)
         ]
+        self.parts = [part for part in made if len(part.triangles)]
 
     def at(self, raw: npt.NDArray[np.float32]) -> Doubles:
         """float64[P, 3] of a pose. Args: raw: float32[R]."""
