@@ -16,6 +16,7 @@ from conftest import GOLDEN, PROJECT, no_room
 from gltf_oracle import GlbFile
 from risorius.cli import main
 from risorius.controls import arkit
+from risorius.files.jpeg import jpeg
 from risorius.files.png import png
 from risorius.gameface import Wishes, export
 
@@ -212,6 +213,20 @@ def test_a_rig_without_the_controls_is_told_and_given_by_its_own_names(tmp_path,
     names = {name for mesh in found.meshes() for name in found.names(mesh)}
     assert "face_own_0" in names
     assert not any(set(name) & set("/.[]:") for name in names)
+
+
+def test_a_picture_of_another_program_comes_as_it_is(face, tmp_path, capsys):
+    dna = risorius.load(face)
+    dna.metadata = {f"texture:{HEAD}:color": "skin.jpg"}
+    path = tmp_path / "photo.dna"
+    dna.save(path)
+    picture = jpeg(np.zeros((8, 8, 3), np.uint8))
+    (tmp_path / "skin.jpg").write_bytes(picture)
+    found = made(path, tmp_path)
+    assert f"it comes as it is, {len(picture)} bytes" in capsys.readouterr().out
+    [image] = found.json["images"]
+    assert image["mimeType"] == "image/jpeg"
+    assert bytes(found.view(image["bufferView"])) == picture
 
 
 def test_a_texture_of_16_384_pixels_is_left_out_with_a_line(face, tmp_path, capsys):

@@ -19,6 +19,7 @@ from .glb import Glb
 Pixels = npt.NDArray[np.uint8]
 
 LARGEST = 8192
+_AS_THEY_ARE = ("image/png", "image/jpeg")  # every client shows these
 _QUALITY = {"color": 85, "normal": 88, "roughness": 75}
 # Colour and roughness of what has no texture.
 _PLAIN = {
@@ -39,7 +40,8 @@ class Materials:
         """Args: dna: has the metadata; file: its file."""
         self._textures = Textures(dna, file)
         self._pixels: dict[str, Pixels | None] = {}
-        self._packed: dict[tuple[str, str, int], tuple[str, bytes]] = {}
+        self._packed: dict[tuple[str, str, int], tuple[str, bytes] | None] = {}
+        self._whole: dict[str, tuple[str, bytes]] = {}
         self.notes: list[str] = []
 
     def add(self, mesh: str, glb: Glb, known: dict[str, int], longest: int) -> int:
@@ -100,21 +102,15 @@ class Materials:
 
     def _picture(self, name: str, role: str, longest: int, glb: Glb, alpha: str = "") -> int | None:
         """The texture of a file, None where there is none."""
-        pixels = self._read(name) if name else None
-        if pixels is None:
+        if not name:
             return None
         key = (name, role, longest)
         if key not in self._packed:
-            small = halved(pixels, longest)
-            opacity = self._read(alpha) if alpha else None
-            if opacity is not None and small.ndim == 3 and small.shape[2] == 3:
-                small = np.dstack([small, _like(halved(opacity, longest), small)])
-            if small.ndim == 3 and small.shape[2] == 4:
-                self._packed[key] = ("image/png", pixels_to_png(small))
-            else:
-                data = jpeg(small, _QUALITY[role], fine_color=role == "normal")
-                self._packed[key] = ("image/jpeg", data)
-        media, data = self._packed[key]
+            self._packed[key] = self._made(name, role, longest, alpha)
+        found = self._packed[key]
+        if found is None:
+            return None
+        media, data = found
         label = f"{Path(name).stem}_{role}"
         images, textures = glb.table.setdefault("images", []), glb.table.setdefault("textures", [])
         for number, texture in enumerate(textures):
@@ -124,6 +120,19 @@ class Materials:
         glb.table.setdefault("samplers", [{"magFilter": 9729, "minFilter": 9987}])
         textures.append({"source": len(images) - 1, "sampler": 0})
         return len(textures) - 1
+
+    def _made(self, name: str, role: str, longest: int, alpha: str) -> tuple[str, bytes] | None:
+        """Media type and bytes of a picture."""
+        pixels = self._read(name)
+        if pixels is None:
+            return self._whole.get(name)
+        small = halved(pixels, longest)
+        opacity = self._read(alpha) if alpha else None
+        if opacity is not None and small.ndim == 3 and small.shape[2] == 3:
+            small = np.dstack([small, _like(halved(opacity, longest), small)])
+        if small.ndim == 3 and small.shape[2] == 4:
+            return "image/png", pixels_to_png(small)
+        return "image/jpeg", jpeg(small, _QUALITY[role], fine_color=role == "normal")
 
     def _read(self, name: str) -> Pixels | None:
         if name not in self._pixels:
@@ -146,10 +155,15 @@ class Materials:
             )
             return None
         pixels = read_pixels(data, opacity=True) if shape else None
-        if pixels is None:
+        media = media_type(data)
+        if pixels is None and media in _AS_THEY_ARE:
+            self._whole[name] = (media, data)
             self.notes.append(
-                f"{name}: a PNG of 8 bits as Risorius writes it was expected, this is another "
-                f"{media_type(data)}: a plain colour instead"
+                f"{name}: another program's picture: it comes as it is, {len(data):,} bytes"
+            )
+        elif pixels is None:
+            self.notes.append(
+                f"{name}: a PNG or JPEG file was expected, this is {media}: a plain colour instead"
             )
         return pixels
 
