@@ -198,6 +198,13 @@ def test_what_cannot_be_is_said_in_a_sentence(face, tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_face_whose_pose_is_no_number_is_a_sentence(tmp_path, capsys):
+    path = GOLDEN / "malformed" / "group_value_nan.dna"
+    code, line = sentence(capsys, path, "-o", tmp_path / "f.glb", "--shapes", "all")
+    assert code == 1
+    assert "one is no number or farther" in line
+
+
 def test_a_rig_without_the_controls_is_told_and_given_by_its_own_names(tmp_path, capsys):
     dna = risorius.load(GOLDEN / "tiny_v28.dna")
     dna.raw_control_names = [f"face/own.{i}" for i in range(len(dna.raw_control_names))]

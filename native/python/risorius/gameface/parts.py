@@ -13,6 +13,7 @@ from ..author.geometry.simplify import fan_triangles
 from ..author.geometry.skeleton import skin_entries
 from ..solving.surface import Surface
 from ..web.kinds import kind_of
+from .errors import GameFaceError
 from .skeleton import Skeleton
 
 Doubles = npt.NDArray[np.float64]
@@ -23,6 +24,7 @@ _AXES = {
     "back": (0, 0, -1),
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
+_FARTHEST = 1e4  # metres
 INFLUENCES = 4  # of a vertex, as every client takes them
 
 
@@ -70,6 +72,7 @@ class Points:
         vertex = np.concatenate([np.zeros(0, np.int64), *(np.arange(n) for n in counts)])
         points = np.stack([mesh, vertex], axis=1)
         self._probe = surface.probe(points)
+        self._face = dna.name or "the face"
         self.axes = axes_of(dna)
         self.rest = self.at(np.asarray(rig.initial_raw_controls, np.float32))
         starts = np.concatenate([[0], np.cumsum(counts)])
@@ -80,8 +83,21 @@ class Points:
         self.parts = [part for part in made if len(part.triangles)]
 
     def at(self, raw: npt.NDArray[np.float32]) -> Doubles:
-        """float64[P, 3] of a pose. Args: raw: float32[R]."""
-        return np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T
+        """float64[P, 3] of a pose.
+
+        Args:
+            raw: float32[R].
+
+        Raises:
+            GameFaceError: a pose has places that are no numbers.
+        """
+        found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T
+        if not (np.abs(found) < _FARTHEST).all():
+            raise GameFaceError(
+                f"{self._face}: vertices nearer than 10 km were expected, "
+                "one is no number or farther"
+            )
+        return found
 
     def _part(self, name: str, mesh: Mesh, start: int, skeleton: Skeleton) -> Part:
         layouts = fan_triangles(mesh)
