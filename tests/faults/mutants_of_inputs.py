@@ -273,6 +273,7 @@ TRIALS: dict[str, tuple[list[str], str]] = {
     "live": (["map.toml"], "live --port 0 --seconds 0.01 --record OUT.csv --mapping map.toml"),
     "web": (["face.dna", "take.csv", "voice.wav"], "web face.dna -o OUT.html --clip take.csv "
             "--sound voice.wav --lods 0:1"),
+    "export": (["face.dna"], "export face.dna -o OUT.glb --shapes all --quantize --within 1"),
     "plot": (["core.dna", "face.dna"], "plot FILE -o OUT.png --dpi 40"),
     "bench": (["frames.npz"], "bench core.dna --frames frames.npz --quick"),
 }  # fmt: skip

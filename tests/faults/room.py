@@ -97,6 +97,7 @@ COMMANDS: dict[str, tuple[str, list[str]]] = {
     "clip rzc": (".rzc", ["clip", "convert", "IN", "-o", "OUT"]),
     "eval npz": (".npz", ["eval", "IN", "CORE", "-o", "OUT"]),
     "eval csv": (".csv", ["eval", "IN", "CORE", "-o", "OUT"]),
+    "export": (".glb", ["export", "CORE", "-o", "OUT", "--shapes", "all"]),
     "plot": (".html", ["plot", "CORE", "-o", "OUT", "--dpi", "40"]),
     "speech": (".rzc", ["speech", "VOICE", "-o", "OUT", "--text", "hum"]),
 }

@@ -55,12 +55,16 @@ class Browser:
 
     async def open(self, page: Path, width: int, height: int, phone: bool = False) -> str:
         """Opens a file and waits until it is ready or says an error. Returns: the page's state."""
+        return await self.open_address(page.resolve().as_uri(), width, height, phone)
+
+    async def open_address(self, address: str, width: int, height: int, phone: bool = False) -> str:
+        """As open, of what a server gives."""
         await self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone,
         )  # fmt: skip
         await self.call("Emulation.setTouchEmulationEnabled", enabled=phone)
-        await self.call("Page.navigate", url=page.resolve().as_uri())
+        await self.call("Page.navigate", url=address)
         for _ in range(SECONDS * 4):
             await asyncio.sleep(0.25)
             state = await self.evaluate("document.body?.dataset.state ?? 'loading'")

@@ -65,7 +65,7 @@ def test_every_kind_of_block_is_known():
     assert {kind for kind, _ in BLOCKS} == {"", "bash", "python"}
     used = {(command(line) or ["-"])[0] for line in lines()}
     every = {"info", "check", "convert", "eval", "sample", "plot", "bench", "edit", "mix", "clip",
-             "speech", "live", "batch", "web"}  # fmt: skip
+             "speech", "live", "batch", "web", "export"}  # fmt: skip
     assert used - {"-"} == every
 
 

@@ -29,6 +29,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
         column.operator("risorius.export_animation", icon="EXPORT")
         column.operator("risorius.bake_physics", icon="PHYSICS")
         column.operator("risorius.export_web", icon="URL")
+        column.operator("risorius.export_game_face", icon="SHAPEKEY_DATA")
 
 
 def draw_late(layout: UILayout, rig: ArmatureObject) -> None:

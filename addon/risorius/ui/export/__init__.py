@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Animation that leaves Blender: through its own exporters, as a clip or as a table."""
 
-from . import operators, web
+from . import game_face, operators, web
 
-CLASSES = (*operators.CLASSES, *web.CLASSES)
+CLASSES = (*operators.CLASSES, *web.CLASSES, *game_face.CLASSES)

@@ -168,6 +168,7 @@ class RISORIUS_MT_face_out(Menu):
         layout.separator()
         layout.operator("risorius.export_animation", icon="EXPORT")
         layout.operator("risorius.export_web", icon="URL")
+        layout.operator("risorius.export_game_face", icon="SHAPEKEY_DATA")
         layout.operator("risorius.export_dna")
         layout.separator()
         layout.operator("risorius.prepare_for_export", icon="ARMATURE_DATA").enable = True

@@ -33,7 +33,7 @@ from . import (
 from . import eval as evaluate
 from .faces import author, mix, sample, solve
 from .files import CommandLineError
-from .pages import plot, web
+from .pages import export, plot, web
 from .terminal import obeyed_by_nobody
 
 INTERRUPTED = 130
@@ -107,6 +107,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         sample,
         plot,
         web,
+        export,
         bench,
         edit,
         author,

@@ -14,19 +14,13 @@ import numpy.typing as npt
 
 from .._native import Dna
 from ..files.jpeg import jpeg
-from ..files.names import is_file_name
 from ..files.png import has_opacity, read_pixels
 from .kinds import kind_of
+from .textures import Textures, base_name, halved, media_type
 
 Pixels = npt.NDArray[np.uint8]
 
-_KINDS = {
-    b"\x89PNG\r\n\x1a\n": "image/png",
-    b"\xff\xd8\xff": "image/jpeg",
-    b"RIFF": "image/webp",
-}
 _JPEG = "image/jpeg"
-_MOST = 16 << 20  # bytes of one picture
 # Role -> longest side, quality. Wrinkles are soft, and hair has one colour for the most part.
 _SIZES = {
     "color": (1024, 82),
@@ -38,7 +32,6 @@ _SIZES = {
     "masks": (1024, 80),
 }
 _ROLES = ("color", "alpha", "normal", "roughness")
-_LOD = re.compile(r"_lod\d+.*", re.IGNORECASE)
 _REGION = re.compile(r"head_wm([123])_(?!normal)[A-Za-z]+(?:_[A-Za-z]{1,2})?$")
 _TILE = 128  # pixels: masks are soft, and the page has all in one picture
 _FLUSH = 3  # the channel behind the three sets of wrinkles
@@ -77,21 +70,15 @@ def find_looks(dna: Dna, file: Path | None = None) -> Looks:
 class _Finder:
     def __init__(self, dna: Dna, file: Path | None) -> None:
         self.dna = dna
-        self.folders = (
-            () if file is None else (file.with_name(f"{file.stem}_textures"), file.parent)
-        )
         self.out = Looks()
         self.numbers: dict[tuple[str, str], dict[str, int]] = {}
-        self.named: dict[str, dict[str, str]] = {}
-        for key, name in dna.metadata.items():
-            words = key.split(":", 2)
-            if len(words) == 3 and words[0] == "texture":
-                self.named.setdefault(_base(words[1]), {}).setdefault(words[2], name)
+        self.textures = Textures(dna, file)
+        self.named = self.textures.named
 
     def looks(self) -> Looks:
         bases: dict[str, int] = {}
         for mesh in self.dna.mesh_names:
-            base = _base(mesh)
+            base = base_name(mesh)
             if base not in bases:
                 bases[base] = len(self.out.materials)
                 self.out.materials.append(self._material(base, kind_of(mesh)))
@@ -114,12 +101,12 @@ class _Finder:
         """Role -> number of a picture; two where a colour has its opacity with it."""
         if (name, role) in self.numbers:
             return self.numbers[name, role]
-        data = self._read(name)
+        data = self.textures.read(name)
         found: dict[str, int] = {}
         if data:
             pixels = read_pixels(data, opacity=True)
             if pixels is None:
-                found[role] = self._add(_media(data), data)
+                found[role] = self._add(media_type(data), data)
                 if has_opacity(data) and kind in ("hair", "lashes"):
                     found["cut"] = 1  # by the opacity of the colour itself
             elif pixels.ndim == 3 and pixels.shape[2] == 4:
@@ -163,47 +150,19 @@ class _Finder:
     def _compress(self, pixels: Pixels, role: str) -> int:
         longest, quality = _SIZES.get(role, _SIZES["color"])
         fine = role in ("normal", "wrinkles")
-        return self._add(_JPEG, jpeg(_halved(pixels, longest), quality, fine_color=fine))
+        return self._add(_JPEG, jpeg(halved(pixels, longest), quality, fine_color=fine))
 
     def _add(self, media: str, data: bytes) -> int:
         self.out.pictures.append((media, data))
         return len(self.out.pictures) - 1
 
     def _pixels(self, name: str) -> Pixels | None:
-        data = self._read(name)
+        data = self.textures.read(name)
         return read_pixels(data) if data else None
-
-    def _read(self, name: str) -> bytes:
-        """b"" where no such picture is there. Metadata may name no file elsewhere."""
-        if not is_file_name(name):
-            return b""
-        for folder in self.folders:
-            path = folder / name
-            if path.is_file() and path.stat().st_size <= _MOST:
-                data = path.read_bytes()
-                return data if _media(data) else b""
-        return b""
-
-
-def _base(mesh: str) -> str:
-    return _LOD.sub("", mesh)
-
-
-def _media(data: bytes) -> str:
-    return next((kind for start, kind in _KINDS.items() if data.startswith(start)), "")
-
-
-def _halved(pixels: Pixels, longest: int) -> Pixels:
-    """The mean of four in place of each four, until no side is longer."""
-    while max(pixels.shape[:2]) > longest and min(pixels.shape[:2]) > 1:
-        rows, columns = pixels.shape[0] // 2 * 2, pixels.shape[1] // 2 * 2
-        four = [pixels[i:rows:2, j:columns:2].astype(np.uint16) for i in (0, 1) for j in (0, 1)]
-        pixels = ((sum(four[1:], four[0]) + 2) // 4).astype(np.uint8)
-    return pixels
 
 
 def _squared(mask: Pixels) -> Pixels:
     """uint8[_TILE, _TILE]: what is nearest in a mask of any size."""
-    small = _halved(mask, _TILE)
+    small = halved(mask, _TILE)
     row, column = ((np.arange(_TILE) * size // _TILE).astype(np.int64) for size in small.shape)
     return small[row[:, None], column[None, :]]

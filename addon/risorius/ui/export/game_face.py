@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""Export of a face with morph targets that other programs drive by name."""
+
+from pathlib import Path
+
+import bpy
+
+from ... import native
+from ...scene.base import parts, saved
+from ...scene.file import export_dna
+from .. import words
+from ..blender_types import Context, ExportHelper, Operator, Result
+from ..common import FaceOperator, explain, face_rig, proposed_file, system_path
+
+
+class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
+    """Write the active face as glTF with morph targets."""
+
+    bl_idname = "risorius.export_game_face"
+    bl_label = "Export Game Face"
+    bl_description = (
+        "Write the active face as glTF whose morph targets other programs drive by name: ARKit, "
+        "visemes, VRM"
+    )
+    bl_options = {"PRESET"}
+
+    filename_ext = ".glb"
+    filter_glob: bpy.props.StringProperty(default="*.glb", options={"HIDDEN"})
+    shapes: bpy.props.EnumProperty(
+        name="Shapes",
+        items=(
+            ("arkit", "ARKit", "The 52 units of ARKit"),
+            ("visemes", "Visemes", "The 15 visemes of Oculus lip sync"),
+            ("vrm", "VRM", "The preset expressions of VRM 1.0"),
+            ("expressions", "Expressions", "The expressions of Risorius"),
+            ("all", "All Controls", "Each control by its own name"),
+        ),
+        options={"ENUM_FLAG"},
+        default={"arkit", "visemes"},
+    )
+    lod: bpy.props.IntProperty(name="LOD", description="Level of detail", min=0, max=15)
+    megabytes: bpy.props.FloatProperty(
+        name="Megabytes",
+        description="What the file may have: textures, vertices and levels become smaller until "
+        "it fits. 0: any size",
+        min=0.0,
+        max=1000.0,
+    )
+    use_skeleton: bpy.props.BoolProperty(
+        name="Skeleton", description="Joints of neck, head, jaw and eyes", default=True
+    )
+    use_quantize: bpy.props.BoolProperty(
+        name="Quantize", description="Vertices of 16 bits, which most programs read"
+    )
+    use_meshopt: bpy.props.BoolProperty(
+        name="Compress", description="Packed by meshoptimizer, which not every program reads"
+    )
+    use_combinations: bpy.props.BoolProperty(
+        name="Combinations",
+        description="Targets for what others lack where they are on together, with a script that "
+        "drives them in a browser",
+    )
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        if not self.filepath:
+            self.filepath = proposed_file(face_rig(context).name, ".glb")
+        return ExportHelper.invoke(self, context, event)
+
+    def draw(self, context: Context) -> None:
+        del context
+        layout = self.layout
+        layout.use_property_split = True
+        column = layout.column(heading="Shapes")
+        column.use_property_split = False
+        column.prop(self, "shapes")
+        for name in ("lod", "megabytes"):
+            layout.prop(self, name)
+        for name in ("use_skeleton", "use_quantize", "use_meshopt", "use_combinations"):
+            layout.prop(self, name)
+
+    def execute(self, context: Context) -> Result:
+        fileio, gameface = native.part("files.fileio"), native.part("gameface")
+        self.filepath = system_path(self.filepath)
+        out = Path(self.filepath)
+        try:
+            fileio.check_writable(self.filepath)
+            rig = face_rig(context)
+            content, _ = export_dna.export(context, rig)
+            dna = native.module().load(content)
+            source = Path(bpy.path.abspath(saved.text(rig, parts.SOURCE)))
+            wishes = gameface.Wishes(
+                tuple(name for name in gameface.GROUPS if name in self.shapes),
+                self.lod,
+                self.use_skeleton,
+                quantize=self.use_quantize,
+                meshopt=self.use_meshopt,
+                mb=self.megabytes or None,
+                within=0.5 if self.use_combinations else None,
+            )
+            made = gameface.export(dna, native.module().Rig(dna), source, out.name, wishes)
+            fileio.write_all({out.with_name(name): data for name, data in made.files.items()})
+        except native.user_errors() as error:
+            self.report({"ERROR"}, explain(self.filepath, error))
+            return {"CANCELLED"}
+        for note in made.notes:
+            self.report({"WARNING"}, note)
+        count = len(made.files[out.name])
+        self.report({"INFO"}, words.say("{name}: {count:,} bytes", name=out.name, count=count))
+        return {"FINISHED"}
+
+
+CLASSES = (RISORIUS_OT_export_game_face,)

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Export Game Face: the active face as glTF, or one sentence."""
+
+import json
+import struct
+
+import bpy
+import pytest
+from support import scene
+
+
+def _table(path):
+    data = path.read_bytes()
+    [size] = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + size])
+
+
+def test_the_face_becomes_targets_by_name_with_their_driver(dna_file, tmp_path):
+    scene.load(dna_file)
+    path = tmp_path / "face.glb"
+    done = bpy.ops.risorius.export_game_face(
+        filepath=str(path), shapes={"arkit"}, use_quantize=True, use_combinations=True
+    )
+    assert done == {"FINISHED"}
+    table = _table(path)
+    assert table["extensionsRequired"] == ["KHR_mesh_quantization"]
+    names = [mesh["extras"]["targetNames"] for mesh in table["meshes"] if "extras" in mesh]
+    assert "jawOpen" in names[0]
+    assert {"face.combinations.json", "combinations.js"} < {p.name for p in tmp_path.iterdir()}
+
+
+def test_a_level_that_is_not_there_is_one_sentence(dna_file, tmp_path):
+    scene.load(dna_file)
+    path = tmp_path / "face.glb"
+    with pytest.raises(RuntimeError, match="a LOD from 0 to .* was expected, found 15"):
+        bpy.ops.risorius.export_game_face(filepath=str(path), lod=15)
+    assert not path.exists()

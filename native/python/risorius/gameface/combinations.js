@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// Adds what a face does where morph targets do not add up: targets that are on together, targets
+// that are half on, and targets that act on top of another one, as mouthClose does on jawOpen. Works with three.js, three-vrm and whatever else has objects with
+// `morphTargetDictionary` and `morphTargetInfluences`.
+//
+//   import { Combinations } from './combinations.js';
+//   const combinations = new Combinations(await (await fetch('face.combinations.json')).json(), scene);
+//   // each frame, after the targets were set and before the scene is drawn:
+//   combinations.update();
+
+const FORMAT = 'risorius.combinations';
+const VERSION = 1;
+const KINDS = {
+  product: { drivers: 2, weight: (a, b) => a * b },
+  half: { drivers: 1, weight: (a) => 4 * a * (1 - a) },
+  below: { drivers: 2, weight: (a, b) => 4 * a * (1 - b) },
+  share: { drivers: 2, weight: (a, b) => 4 * a * Math.max(0, b - a) },
+};
+
+/** The weight of a combination's target, 0 to 1, from the weights of those that drive it. */
+export function weightOf(kind, weights) {
+  const inside = weights.map((w) => Math.min(1, Math.max(0, w)));
+  return KINDS[kind].weight(...inside);
+}
+
+/** Refuses what is no table of combinations; returns its rows. */
+export function rowsOf(table) {
+  if (!table || table.format !== FORMAT) throw new Error(`combinations: format ${FORMAT} was expected`);
+  if (table.version !== VERSION) {
+    throw new Error(`combinations: version ${VERSION} was expected, found ${table.version}`);
+  }
+  for (const { target, of, weight } of table.combinations) {
+    if (!Object.hasOwn(KINDS, weight)) {
+      const known = Object.keys(KINDS).join(', ');
+      throw new Error(`combinations: ${target}: a weight of ${known} was expected, found ${weight}`);
+    }
+    const many = KINDS[weight].drivers;
+    if (typeof target !== 'string' || !Array.isArray(of) || of.length !== many) {
+      throw new Error(`combinations: ${target}: ${many} targets that drive it were expected`);
+    }
+  }
+  return table.combinations;
+}
+
+/** The meshes with morph targets of a three.js object, or of a list of meshes. */
+function meshesOf(scene) {
+  const found = [];
+  const take = (one) => {
+    if (one.morphTargetDictionary && one.morphTargetInfluences) found.push(one);
+  };
+  if (Array.isArray(scene)) scene.forEach(take);
+  else scene.traverse(take);
+  return found;
+}
+
+export class Combinations {
+  /**
+   * @param table the JSON beside the .glb
+   * @param scene a three.js object that holds the face, or a list of its meshes
+   */
+  constructor(table, scene) {
+    const rows = rowsOf(table);
+    this.plans = [];
+    const meshes = meshesOf(scene);
+    // A mesh may lack a target that does not move it; another mesh then says how far it is on.
+    const sources = new Map();
+    for (const mesh of meshes) {
+      for (const [name, index] of Object.entries(mesh.morphTargetDictionary)) {
+        if (!sources.has(name)) sources.set(name, { mesh, index });
+      }
+    }
+    for (const { target, of, weight } of rows) {
+      const drivers = of.map((name) => sources.get(name));
+      const driven = [];
+      for (const mesh of meshes) {
+        const index = mesh.morphTargetDictionary[target];
+        if (index !== undefined) driven.push({ mesh, index });
+      }
+      if (driven.length && drivers.every(Boolean)) this.plans.push({ weight, drivers, driven });
+    }
+  }
+
+  /** Sets the combinations' targets from the others. Returns how many are on. */
+  update() {
+    let on = 0;
+    for (const { weight, drivers, driven } of this.plans) {
+      const value = weightOf(weight, drivers.map(({ mesh, index }) => mesh.morphTargetInfluences[index]));
+      for (const { mesh, index } of driven) mesh.morphTargetInfluences[index] = value;
+      if (value !== 0) on += 1;
+    }
+    return on;
+  }
+}

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: MIT
+"""A face as one glTF file: meshes with morph targets, materials, a few joints, within a size."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+
+from .._native import Dna, Rig
+from ..base.words import counted, joined
+from .combining import Combination, Sums, chosen, driver_table
+from .errors import GameFaceError
+from .materials import Materials
+from .parts import Points, axes_of
+from .skeleton import find_skeleton
+from .targets import Target, find_targets
+from .wishes import Wishes
+from .writing import Change, Written, write
+
+_SMALL = 256  # pixels: smaller textures show, quantized vertices do not
+_COMBINATIONS = 256  # targets of them where nobody says how many a client takes
+
+
+@dataclass
+class Made:
+    """What was made.
+
+    Attributes:
+        files: name -> bytes, the .glb first.
+        notes: sentences: what is missing, approximated, or was lowered for the size.
+        groups: a line for each group of targets.
+    """
+
+    files: dict[str, bytes]
+    notes: list[str] = field(default_factory=list)
+    groups: list[str] = field(default_factory=list)
+
+
+def export(dna: Dna, rig: Rig, file: Path, out: str, wishes: Wishes) -> Made:
+    """A face as a file of glTF, and the driver of its combinations where it is asked for.
+
+    Args:
+        dna: the whole face, with geometry.
+        rig: compiled from it, with Euler angles.
+        file: of the face: its textures lie beside it, and errors name it.
+        out: the name of the .glb, which the names of the others are made of.
+        wishes: how it is to be.
+
+    Raises:
+        GameFaceError: the face lacks what was asked for; too many targets; no way to the size.
+    """
+    levels = max(1, rig.lod_count)
+    if not wishes.lod < levels:
+        raise GameFaceError(
+            f"{file}: a LOD from 0 to {levels - 1} was expected, found {wishes.lod}"
+        )
+    targets, notes = find_targets(rig, wishes.shapes, str(file))
+    if wishes.most is not None and len(targets) > wishes.most:
+        raise GameFaceError(
+            f"{file}: {counted(wishes.most, 'target')} at most were asked for, "
+            f"{' and '.join(wishes.shapes)} are {len(targets)}: leave a group out"
+        )
+    maker = _Maker(dna, rig, file, targets)
+    written, wish = maker.make(wishes), wishes
+    if wishes.mb is not None:
+        written, wish = _within(maker, written, wishes, levels, str(file))
+        if wish != wishes:
+            said = ", ".join(_lowered(wishes, wish))
+            notes.append(f"for {wishes.mb:g} MB: {said}; the file has {_megabytes(written)}")
+    made = Made({out: written.data}, notes + maker.notes, maker.lines(written))
+    if wishes.within is not None:
+        stem = out.rpartition(".")[0]
+        table = json.dumps(driver_table(out, maker.made), indent=1) + "\n"
+        made.files[f"{stem}.combinations.json"] = table.encode()
+        script = resources.files(__package__).joinpath("combinations.js").read_bytes()
+        made.files["combinations.js"] = script
+    return made
+
+
+def _within(
+    maker: _Maker, written: Written, wishes: Wishes, levels: int, face: str
+) -> tuple[Written, Wishes]:
+    """The file within its size, and how it came to be.
+
+    Raises:
+        GameFaceError: with everything lowered it is still larger.
+    """
+    most, wish = int((wishes.mb or 0) * 1e6), wishes
+    for lower in _lower(wishes, levels):
+        if len(written.data) <= most:
+            break
+        wish = lower
+        written = maker.make(wish)
+    if len(written.data) > most:
+        more = "" if wishes.meshopt else ", or --meshopt"
+        raise GameFaceError(
+            f"{face}: at most {wishes.mb:g} MB were expected, with everything lowered it has "
+            f"{_megabytes(written)}: ask for fewer shapes{more}"
+        )
+    size = wishes.textures
+    while wish.lod != wishes.lod and size > wish.textures:  # a coarser level may leave room
+        larger = replace(wish, textures=size)
+        again = maker.make(larger)
+        if len(again.data) <= most:
+            return again, larger
+        size //= 2
+    return written, wish
+
+
+def _lower(wishes: Wishes, levels: int) -> Iterator[Wishes]:
+    """What makes the file smaller, each on top of the one before: what shows most comes last."""
+    wish = wishes
+    if not (wish.sparse or wish.meshopt):
+        wish = replace(wish, sparse=True)
+        yield wish
+    while wish.textures > _SMALL:
+        wish = replace(wish, textures=max(_SMALL, wish.textures // 2))
+        yield wish
+    if not wish.quantize:
+        wish = replace(wish, quantize=True)
+        yield wish
+    for lod in range(wish.lod + 1, levels):
+        wish = replace(wish, lod=lod)
+        yield wish
+
+
+def _lowered(before: Wishes, after: Wishes) -> Iterator[str]:
+    """What is lower, in words."""
+    if after.sparse != before.sparse:
+        yield "sparse targets"
+    if after.textures != before.textures:
+        yield f"textures of {after.textures} pixels"
+    if after.quantize != before.quantize:
+        yield "quantized vertices"
+    if after.lod != before.lod:
+        yield f"LOD {after.lod}"
+
+
+def _megabytes(written: Written) -> str:
+    return f"{len(written.data) / 1e6:.2f} MB"
+
+
+class _Maker:
+    """The file of a face again and again, with what needs no second look kept."""
+
+    def __init__(self, dna: Dna, rig: Rig, file: Path, targets: Sequence[Target]) -> None:
+        self._dna, self._rig, self._targets = dna, rig, targets
+        self._materials = Materials(dna, file)
+        self._file = file
+        self._lod = -1
+        self._wishes = Wishes()
+        self.notes: list[str] = []
+        self.made: list[Combination] = []
+        self._found: dict[str, list[Combination]] = {}
+
+    def make(self, wishes: Wishes) -> Written:
+        """The file as wished, whatever its size."""
+        self._wishes = wishes
+        if wishes.lod != self._lod:
+            self._take_level(wishes)
+        changes = [Change(t.name, t.group, self._sums.delta(t.name)) for t in self._targets]
+        changes += [Change(c.name, "combinations", self._sums.combination(c)) for c in self.made]
+        written = write(self._points, self._skeleton, self._materials, changes, wishes)
+        self.notes = self._combined + list(dict.fromkeys(self._materials.notes))
+        return written
+
+    def _take_level(self, wishes: Wishes) -> None:
+        self._lod = wishes.lod
+        self._skeleton = find_skeleton(self._dna, axes_of(self._dna))
+        self._points = Points(self._dna, self._rig, wishes.lod, self._skeleton)
+        if not self._points.parts:
+            raise GameFaceError(
+                f"{self._file}: meshes at LOD {wishes.lod} were expected, there are none"
+            )
+        self._sums = Sums(self._points, self._rig, self._targets)
+        self._found = {group: self._sums.errors(group) for group in dict.fromkeys(wishes.shapes)}
+        self.made, self._combined = [], []
+        if wishes.within is None:
+            return
+        room = _COMBINATIONS if wishes.most is None else wishes.most - len(self._targets)
+        # Captures drive one group: the first that was asked for, which is ARKit mostly.
+        first = self._found[wishes.shapes[0]]
+        self.made = chosen(first, wishes.within, room)
+        left = first[len(self.made)].error_mm if len(self.made) < len(first) else 0.0
+        if left > wishes.within:
+            self._combined.append(
+                f"combinations: {counted(room, 'target')} leave {left:.2f} mm of "
+                f"{joined(first[len(self.made)].of)}: more than {wishes.within:g} mm"
+            )
+
+    def lines(self, written: Written) -> list[str]:
+        """For each group of targets how many, on how many vertices, bytes, and what sums leave."""
+        out = []
+        for group, found in self._found.items():
+            tried, there = self._sums.tried[group]
+            few = "" if tried == there else f" of {tried:,} of {there:,} pairs"
+            worst = found[0] if found else None
+            away = f"{worst.error_mm:.2f} mm ({' + '.join(worst.of)})" if worst else "0.00 mm"
+            out.append(f"{_size(written, group)}, linear sum within {away}{few}")
+        if self.made:
+            done = {one.name for one in self.made}
+            left = [c for c in self._found[self._wishes.shapes[0]] if c.name not in done]
+            most = left[0].error_mm if left else 0.0
+            out.append(f"{_size(written, 'combinations')}, with them within {most:.2f} mm")
+        return out
+
+
+def _size(written: Written, group: str) -> str:
+    count, vertices, size = written.groups.get(group, (0, 0, 0))
+    return f"{group}: {counted(count, 'target')}, {counted(vertices, 'vertex')}, {size:,} bytes"

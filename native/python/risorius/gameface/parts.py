@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: MIT
+"""The meshes of one level as glTF has them, and where a pose brings their vertices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .._native import Dna, Mesh, Rig
+from ..author.geometry.simplify import fan_triangles
+from ..author.geometry.skeleton import skin_entries
+from ..solving.surface import Surface
+from ..web.kinds import kind_of
+from .errors import GameFaceError
+from .skeleton import Skeleton
+
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+_AXES = {
+    "right": (1, 0, 0), "left": (-1, 0, 0), "up": (0, 1, 0), "down": (0, -1, 0), "front": (0, 0, 1),
+    "back": (0, 0, -1),
+}  # fmt: skip
+_METRES = {"cm": 0.01, "m": 1.0}
+_FARTHEST = 1e4  # metres
+INFLUENCES = 4  # of a vertex, as every client takes them
+
+
+@dataclass(frozen=True)
+class Part:
+    """A mesh.
+
+    Attributes:
+        name: without what a client takes for a path.
+        mesh: its name in the DNA file.
+        kind: of web.kinds.
+        rows: int64[V], each vertex's place among the points of Points.
+        uv: float64[V, 2], v from the top as glTF counts it.
+        normals: float64[V, 3] at rest.
+        triangles: int64[T, 3].
+        joints, weights: int64 and float64[V, INFLUENCES], of the skeleton; in steps of 1 / 255.
+    """
+
+    name: str
+    mesh: str
+    kind: str
+    rows: Ints
+    uv: Doubles
+    normals: Doubles
+    triangles: Ints
+    joints: Ints
+    weights: Doubles
+
+
+class Points:
+    """All points of a level, asked together.
+
+    Attributes:
+        parts: the meshes.
+        rest: float64[P, 3], metres, y up, the face looks along z.
+        axes: float64[3, 3] from the file's axes to those of glTF, metres.
+    """
+
+    def __init__(self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton) -> None:
+        """Args: dna: with geometry; rig: of it; lod: of the file; skeleton: of its joints."""
+        surface = Surface(dna, rig, lod)
+        meshes = [m for m in surface.mesh_indices if len(dna.meshes[m].positions)]
+        counts = [len(dna.meshes[m].positions) for m in meshes]
+        mesh = np.repeat(np.array(meshes, np.int64), counts)
+        vertex = np.concatenate([np.zeros(0, np.int64), *(np.arange(n) for n in counts)])
+        points = np.stack([mesh, vertex], axis=1)
+        self._probe = surface.probe(points)
+        self._face = dna.name or "the face"
+        self.axes = axes_of(dna)
+        self.rest = self.at(np.asarray(rig.initial_raw_controls, np.float32))
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        made = [
+            self._part(dna.mesh_names[m], dna.meshes[m], int(start), skeleton)
+            for m, start in zip(meshes, starts[:-1], strict=True)
+        ]
+        self.parts = [part for part in made if len(part.triangles)]
+
+    def at(self, raw: npt.NDArray[np.float32]) -> Doubles:
+        """float64[P, 3] of a pose.
+
+        Args:
+            raw: float32[R].
+
+        Raises:
+            GameFaceError: a pose has places that are no numbers.
+        """
+        found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T
+        if not (np.abs(found) < _FARTHEST).all():
+            raise GameFaceError(
+                f"{self._face}: vertices nearer than 10 km were expected, "
+                "one is no number or farther"
+            )
+        return found
+
+    def _part(self, name: str, mesh: Mesh, start: int, skeleton: Skeleton) -> Part:
+        layouts = fan_triangles(mesh)
+        places = mesh.layout_positions.astype(np.int64)
+        textures = np.zeros(len(places), np.int64)
+        if len(mesh.texture_coordinates):
+            textures = mesh.layout_texture_coordinates.astype(np.int64)
+        key = places * (int(textures.max(initial=0)) + 1) + textures
+        # In the order of the triangles neighbours lie together, which packs better.
+        _, first, turn = np.unique(key[layouts.ravel()], return_index=True, return_inverse=True)
+        order = np.argsort(first, kind="stable")
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+        corner = layouts.ravel()[first[order]]
+        triangles = rank[turn.ravel()].reshape(-1, 3)
+        if np.linalg.det(self.axes) < 0:
+            triangles = triangles[:, ::-1]
+        row = places[corner]
+        uv = np.zeros((len(row), 2))
+        if len(mesh.texture_coordinates):
+            uv = mesh.texture_coordinates[textures[corner]].astype(np.float64)
+        joints, weights = _skin(mesh, skeleton)
+        rows = start + row
+        normals = unit(_own_normals(mesh)[row] @ self.axes.T)
+        if not len(mesh.normals):
+            normals = normals_of(self.rest[rows], triangles, rows)
+        return Part(
+            name.replace("/", "_"), name, kind_of(name), rows,
+            np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1), normals,
+            triangles, joints[row], weights[row],
+        )  # fmt: skip
+
+
+def axes_of(dna: Dna) -> Doubles:
+    """float64[3, 3] from the file's axes and unit to glTF's: metres, y up, z to the front."""
+    words = dna.coordinate_system
+    known = all(word in _AXES for word in words)
+    columns = [_AXES[word] for word in (words if known else ("right", "up", "front"))]
+    return np.array(columns, np.float64).T * _METRES.get(dna.translation_unit, 0.01)
+
+
+def unit(vectors: Doubles) -> Doubles:
+    """Vectors of length 1; (0, 0, 1) for none."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), [0.0, 0.0, 1.0])
+
+
+def normals_of(points: Doubles, triangles: Ints, rows: Ints) -> Doubles:
+    """float64[V, 3]: smooth over seams of texture coordinates.
+
+    Args:
+        points: float64[V, 3].
+        triangles: int64[T, 3].
+        rows: int64[V], equal where vertices are one point.
+    """
+    corners = points[triangles]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    _, place = np.unique(rows, return_inverse=True)
+    count = int(place.max(initial=-1)) + 1
+    sums = np.zeros((count, 3))
+    for corner in place[triangles].T:
+        for axis in range(3):
+            sums[:, axis] += np.bincount(corner, faces[:, axis], count)
+    return unit(np.asarray(sums[place], np.float64))
+
+
+def _own_normals(mesh: Mesh) -> Doubles:
+    """float64[positions, 3]: the mean of the corners' normals."""
+    sums = np.zeros((len(mesh.positions), 3))
+    if len(mesh.normals):
+        np.add.at(sums, mesh.layout_positions, mesh.normals[mesh.layout_normals].astype(np.float64))
+    return sums
+
+
+def _skin(mesh: Mesh, skeleton: Skeleton) -> tuple[Ints, Doubles]:
+    """The strongest joints of the skeleton of each position."""
+    count = len(mesh.positions)
+    width = max(INFLUENCES, len(skeleton.names))
+    dense = np.zeros((count, width))
+    vertex, joint, weight = skin_entries(mesh)
+    np.add.at(dense, (vertex, skeleton.of_joint[joint]), weight)
+    dense[dense.sum(axis=1) <= 0, skeleton.head] = 1.0
+    joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
+    weights = np.take_along_axis(dense, joints, axis=1)
+    steps = np.rint(255 * weights / weights.sum(axis=1, keepdims=True))
+    steps[:, 0] += 255 - steps.sum(axis=1)  # the strongest takes what rounding leaves
+    joints[steps <= 0] = 0
+    return joints, steps / 255

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""Which morph targets a client expects by name, and the pose of the rig that each of them is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import expressions
+from .._native import Rig
+from ..base.words import counted, joined
+from ..controls import arkit, vocabulary
+from .errors import GameFaceError
+
+Floats = npt.NDArray[np.float32]
+
+GROUPS = ("arkit", "visemes", "vrm", "expressions", "all")
+VRM = (
+    "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh",
+    "blink", "blinkLeft", "blinkRight", "lookUp", "lookDown", "lookLeft", "lookRight",
+)  # fmt: skip
+"""The presets of VRM 1.0."""
+_UNSAFE = re.compile(r"[^\w+\- ]")  # three.js and Unreal take dots, brackets and slashes for paths
+_LISTED = 6
+
+
+@dataclass(frozen=True)
+class Target:
+    """A morph target.
+
+    Attributes:
+        name: as the client spells it.
+        group: of GROUPS.
+        raw: float32[R], the pose.
+        base: float32[R], the pose that it is counted from.
+        needs: the target that is on where this one acts, "" for none.
+    """
+
+    name: str
+    group: str
+    raw: Floats
+    base: Floats
+    needs: str = ""
+
+
+def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Target], list[str]]:
+    """The targets of groups, and a sentence for each thing that the rig lacks.
+
+    Args:
+        rig: the compiled face.
+        groups: of GROUPS, in the order in which the file has them.
+        face: names the face in errors.
+
+    Raises:
+        GameFaceError: the rig can show nothing of a group.
+    """
+    finder = _Finder(rig)
+    out, notes = list[Target](), list[str]()
+    taken: set[str] = set()
+    for group in groups:
+        found = finder.group(group, notes, face)
+        for one in found:
+            name = _free(one.name, group, taken, notes)
+            out.append(Target(name, group, one.raw, one.base, one.needs))
+    return out, notes
+
+
+def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
+    """A name that every client reads and no other target has."""
+    safe = _UNSAFE.sub("_", name) or "_"
+    if safe != name:
+        notes.append(f"{name}: no client reads such a name: the target is {safe}")
+    if safe in taken:
+        safe = f"{group}_{safe}"
+    number, free = 2, safe
+    while free in taken:
+        number, free = number + 1, f"{safe}_{number}"
+    taken.add(free)
+    return free
+
+
+class _Finder:
+    def __init__(self, rig: Rig) -> None:
+        self.names = rig.raw_control_names
+        self.rest = np.asarray(rig.initial_raw_controls, np.float32)
+        self.index = {name: i for i, name in enumerate(self.names)}
+        for i, name in enumerate(self.names):  # faces of other programs have no prefix
+            self.index.setdefault(vocabulary.PREFIX + name.rpartition(".")[2], i)
+
+    def group(self, group: str, notes: list[str], face: str) -> list[Target]:
+        if group == "all":
+            return list(self._all())
+        rows = dict(_rows(group))
+        absent, partly, out = list[str](), list[str](), list[Target]()
+        for name, weights in rows.items():
+            missing = [control for control in weights if control not in self.index]
+            if weights and len(missing) == len(weights):
+                absent.append(f"{name} ({_short(missing)})")
+                continue
+            if missing:
+                partly.append(f"{name} (without {_short(missing)})")
+            out.append(self._target(name, group, weights))
+        if not any(rows[t.name] for t in out):
+            raise GameFaceError(
+                f"{face}: controls for {group} were expected, such as {vocabulary.PREFIX}jawOpen; "
+                f"the rig has {_some(self.names)}: --shapes all takes them as they are"
+            )
+        if absent:
+            many = counted(len(absent), "shape")
+            notes.append(f"{group}: {many} of {len(rows)} left out, the rig lacks {_some(absent)}")
+        if partly:
+            notes.append(f"{group}: approximated: {_some(partly)}")
+        return out
+
+    def _target(self, name: str, group: str, weights: Mapping[str, float]) -> Target:
+        raw, base, needs = self._pose(weights), self.rest, ""
+        whole = _whole_of(name) if group == "arkit" else ""
+        if whole:  # ARKit counts the shut lips of an open jaw from the open jaw
+            base = self._pose(arkit.mapping()[whole])
+            raw = np.maximum(raw, base)
+            needs = whole
+        return Target(name, group, raw, base, needs)
+
+    def _pose(self, weights: Mapping[str, float]) -> Floats:
+        raw = self.rest.copy()
+        for control, weight in weights.items():
+            if control in self.index:
+                raw[self.index[control]] += weight
+        return raw
+
+    def _all(self) -> Iterator[Target]:
+        for i, name in enumerate(self.names):
+            if self.rest[i] == 0 and not name.endswith((".qx", ".qy", ".qz", ".qw")):
+                raw = self.rest.copy()
+                raw[i] = 1.0
+                yield Target(name.removeprefix(vocabulary.PREFIX), "all", raw, self.rest)
+
+
+def _whole_of(unit: str) -> str:
+    """The ARKit unit that this one takes back a share of, "" for none."""
+    shares = arkit.shares()
+    whole = {shares[control] for control in arkit.mapping()[unit] if control in shares}
+    return next((u for u, row in arkit.mapping().items() if whole & row.keys()), "")
+
+
+def _rows(group: str) -> Iterator[tuple[str, Mapping[str, float]]]:
+    """Name and weights of each target of a group."""
+    if group == "arkit":
+        yield from arkit.mapping().items()
+        return
+    library = expressions.load()
+    if group == "vrm":
+        presets = vocabulary.vocabulary("vrm").meanings
+        for name in VRM:
+            said = presets["Neutral" if name == "neutral" else _spelled(name)]
+            own = library.get(said.expression)
+            yield name, own.weights if own else said.controls
+        return
+    for name, expression in library.items():
+        if (expression.group == "viseme") == (group == "visemes"):
+            yield ("viseme_" + name if group == "visemes" else name), expression.weights
+
+
+def _spelled(preset: str) -> str:
+    return vocabulary.vocabulary("vrm").spelled(preset) or preset
+
+
+def _short(controls: Sequence[str]) -> str:
+    return joined(control.removeprefix(vocabulary.PREFIX) for control in controls)
+
+
+def _some(names: Sequence[str]) -> str:
+    if not names:
+        return "none"
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

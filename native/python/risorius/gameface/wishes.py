@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""How a file of a game face is to be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+TEXTURES = 1024
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """How a file is to be.
+
+    Attributes:
+        shapes: groups of targets, of GROUPS.
+        lod: the level of detail.
+        skeleton: root, neck, head, jaw and eyes are joints.
+        sparse, quantize, meshopt: how lists are kept.
+        normals: targets change normals too.
+        textures: pixels of the longer side of a picture at most.
+        mb: megabytes that the file may have, None: any number.
+        most: targets that the client takes, None: any number.
+        within: millimetres that sums of two may deviate; the driver adds what is missing. None: no
+            driver.
+    """
+
+    shapes: Sequence[str] = ("arkit", "visemes")
+    lod: int = 0
+    skeleton: bool = True
+    sparse: bool = False
+    quantize: bool = False
+    meshopt: bool = False
+    normals: bool = False
+    textures: int = TEXTURES
+    mb: float | None = None
+    most: int | None = None
+    within: float | None = None

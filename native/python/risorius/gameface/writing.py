@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""Meshes, targets, joints and materials as the lists of one glTF file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from .glb import QUANTIZED, Glb
+from .materials import Materials
+from .parts import Part, Points, normals_of
+from .skeleton import Skeleton
+from .wishes import Wishes
+
+Doubles = npt.NDArray[np.float64]
+Floats = npt.NDArray[np.float32]
+
+_STEPS = 32767  # whole numbers to each side of the middle of a quantized face
+_TURNED = 127.0
+_LEAST_TURN = 1e-3  # a change of a normal below a sixteenth of a degree is none
+
+
+class Change(NamedTuple):
+    """A morph target: its name, the group that it is counted with, float32[P, 3] in metres."""
+
+    name: str
+    group: str
+    delta: Floats
+
+
+@dataclass
+class Written:
+    """Attributes:
+    data: the file.
+    groups: group -> targets, vertices that they move, bytes.
+    """
+
+    data: bytes
+    groups: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+
+
+def write(
+    points: Points,
+    skeleton: Skeleton,
+    materials: Materials,
+    changes: Sequence[Change],
+    wishes: Wishes,
+) -> Written:
+    """The file.
+
+    Args:
+        points: of the level.
+        skeleton: of the face, written where wished.
+        materials: of the face.
+        changes: the targets in the order in which meshes have them.
+        wishes: how lists are kept.
+    """
+    farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
+    return _Writer(points, skeleton, materials, wishes, farthest).file(changes)
+
+
+class _Writer:
+    def __init__(
+        self, points: Points, skeleton: Skeleton, materials: Materials, wishes: Wishes,
+        farthest: float,
+    ) -> None:  # fmt: skip
+        self.points, self.skeleton, self.materials = points, skeleton, materials
+        self.wishes = wishes
+        self.glb = Glb(packs=wishes.meshopt, sparse=wishes.sparse)
+        self.step, self.middle = 1.0, np.zeros(3)
+        if wishes.quantize:
+            low, high = points.rest.min(axis=0), points.rest.max(axis=0)
+            self.middle = (low + high) / 2
+            self.step = max(float((high - low).max()) / 2, farthest) / _STEPS or 1.0
+            self.glb.uses(QUANTIZED, required=True)
+        self.known: dict[str, int] = {}
+        self.bytes: dict[str, int] = {}
+        self.names: dict[str, set[str]] = {}
+        self.moved: dict[str, npt.NDArray[np.bool_]] = {}
+
+    def file(self, changes: Sequence[Change]) -> Written:
+        table = self.glb.table
+        nodes = table.setdefault("nodes", [])
+        roots = [self._joints(nodes)] if self.wishes.skeleton else []
+        whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
+        names: set[str] = set()
+        for part in self.points.parts:
+            mesh = self._mesh(part, changes, part is whole)
+            name = _unlike(part.name, names)
+            table.setdefault("meshes", []).append({"name": name, **mesh})
+            node: dict[str, Any] = {"name": name, "mesh": len(table["meshes"]) - 1}
+            if self.wishes.skeleton:
+                node["skin"] = 0
+            elif self.wishes.quantize:
+                node.update(scale=[self.step] * 3, translation=self.middle.tolist())
+            roots.append(len(nodes))
+            nodes.append(node)
+        table.update(scene=0, scenes=[{"name": "Face", "nodes": roots}])
+        groups = {
+            group: (len(self.names[group]), int(self.moved[group].sum()), size)
+            for group, size in self.bytes.items()
+        }
+        return Written(self.glb.data(), groups)
+
+    def _joints(self, nodes: list[dict[str, Any]]) -> int:
+        """The number of the root's node."""
+        own, first = self.skeleton, len(nodes)
+        for i, name in enumerate(own.names):
+            above = own.places[own.parents[i]] if own.parents[i] >= 0 else np.zeros(3)
+            node: dict[str, Any] = {"name": name, "translation": (own.places[i] - above).tolist()}
+            below = [first + j for j, parent in enumerate(own.parents) if parent == i]
+            if below:
+                node["children"] = below
+            nodes.append(node)
+        inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
+        inverse[:, :3, :3] *= self.step  # what a skin turns has no node that would scale it
+        inverse[:, :3, 3] = self.middle - own.places
+        joints = [first + i for i in range(len(own.names))]
+        self.glb.table["skins"] = [
+            {"joints": joints, "skeleton": first, "inverseBindMatrices": self.glb.matrices(inverse)}
+        ]
+        return first
+
+    def _mesh(self, part: Part, changes: Sequence[Change], whole: bool) -> dict[str, Any]:
+        glb, rest = self.glb, self.points.rest[part.rows]
+        attributes = {
+            "POSITION": glb.vertices(self._places(rest - self.middle), bounds=True),
+            "NORMAL": self._directions(part.normals, False),
+        }
+        material = self.materials.add(part.mesh, glb, self.known, self.wishes.textures)
+        if self.materials.is_painted(glb, material):
+            attributes["TEXCOORD_0"] = self._uv(part.uv)
+        if self.wishes.skeleton:
+            attributes["JOINTS_0"] = glb.vertices(part.joints.astype("u1"))
+            attributes["WEIGHTS_0"] = self._weights(part.weights)
+        primitive: dict[str, Any] = {
+            "attributes": attributes,
+            "indices": glb.corners(part.triangles, len(rest)),
+            "material": material,
+        }
+        targets, names = [], []
+        neutral = normals_of(rest, part.triangles, part.rows) if self._turns(part) else None
+        for change in changes:
+            delta = change.delta[part.rows]
+            if whole or delta.any():
+                before = glb.size
+                targets.append(self._target(part, delta, neutral))
+                names.append(change.name)
+                self._count(part, change, glb.size - before)
+        if not targets:
+            return {"primitives": [primitive]}
+        primitive["targets"] = targets
+        return {"primitives": [primitive], "extras": {"targetNames": names}}
+
+    def _turns(self, part: Part) -> bool:
+        # A card of hair has the normals of the skin under it, which its own polygons do not tell.
+        return self.wishes.normals and part.kind not in ("hair", "lashes")
+
+    def _target(self, part: Part, delta: Floats, neutral: Doubles | None) -> dict[str, int]:
+        out = {"POSITION": self.glb.changes(self._places(delta), bounds=True)}
+        if neutral is not None:
+            turned = np.zeros_like(neutral)
+            if delta.any():
+                at = self.points.rest[part.rows] + delta
+                turned = normals_of(at, part.triangles, part.rows) - neutral
+                turned[np.abs(turned).max(axis=1) < _LEAST_TURN] = 0.0
+            out["NORMAL"] = self._directions(turned, True)
+        return out
+
+    def _count(self, part: Part, change: Change, size: int) -> None:
+        self.bytes[change.group] = self.bytes.get(change.group, 0) + size
+        self.names.setdefault(change.group, set()).add(change.name)
+        moved = self.moved.setdefault(change.group, np.zeros(len(self.points.rest), np.bool_))
+        moved[part.rows] |= change.delta[part.rows].any(axis=1)
+
+    def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Metres as the file has them."""
+        if not self.wishes.quantize:
+            return np.ascontiguousarray(values, "<f4")
+        return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")
+
+    def _directions(self, values: Doubles, is_change: bool) -> int:
+        put = self.glb.changes if is_change else self.glb.vertices
+        if not self.wishes.quantize:
+            return put(np.ascontiguousarray(values, "<f4"))
+        return put(np.rint(np.clip(values, -1, 1) * _TURNED).astype("i1"), normalized=True)
+
+    def _uv(self, values: Doubles) -> int:
+        if self.wishes.quantize and values.min() >= 0 and values.max() <= 1:
+            return self.glb.vertices(np.rint(values * 65535).astype("<u2"), normalized=True)
+        return self.glb.vertices(np.ascontiguousarray(values, "<f4"))
+
+    def _weights(self, values: Doubles) -> int:
+        if not self.wishes.quantize:
+            return self.glb.vertices(np.ascontiguousarray(values, "<f4"))
+        return self.glb.vertices(np.rint(values * 255).astype("u1"), normalized=True)
+
+
+def _unlike(name: str, names: set[str]) -> str:
+    """A name that no other mesh has."""
+    free, number = name, 2
+    while free in names:
+        free, number = f"{name}_{number}", number + 1
+    names.add(free)
+    return free

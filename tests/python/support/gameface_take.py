@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""Sums of morph targets as a client shows them, against the rig at the same pose."""
+
+import json
+
+import numpy as np
+import risorius
+from gltf_oracle import GlbFile
+from risorius import importing
+from risorius.controls import arkit
+from risorius.gameface import Wishes, export
+from risorius.gameface.targets import find_targets
+
+
+def units_of(take):
+    """The 52 units of each frame, {name: value}, of a take of Live Link Face."""
+    clip = importing.read(take).clip
+    lower = {name.lower(): row for name, row in zip(clip.names, clip.curves, strict=True)}
+    rows = {unit: lower[unit.lower()] for unit in arkit.mapping()}
+    return [{u: float(row[i]) for u, row in rows.items()} for i in range(clip.frame_count)]
+
+
+def driven(weights, table):
+    """Weights with those of the combinations, as combinations.js sets them."""
+    out = dict(weights)
+    for row in table["combinations"]:
+        a, b = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0)[:2]
+        kinds = {
+            "product": a * b, "half": 4 * a * (1 - a), "below": 4 * a * (1 - b),
+            "share": 4 * a * max(0, b - a),
+        }  # fmt: skip
+        out[row["target"]] = float(kinds[row["weight"]])
+    return out
+
+
+class Posed:
+    """The meshes of a .glb at weights, and the rig's meshes in the same order at raw controls."""
+
+    def __init__(self, dna, rig, found, lod):
+        self.rig, self.found = rig, found
+        self._surface = risorius.Surface(dna, rig, lod)
+        self._number = {name: i for i, name in enumerate(dna.mesh_names)}
+        self._rest, self._deltas, self._where = {}, {}, {}
+        for mesh in found.meshes():
+            self._rest[mesh] = rest = found.positions(mesh)
+            deltas = [found.positions(mesh, {name: 1.0}) - rest for name in found.names(mesh)]
+            self._deltas[mesh] = np.array(deltas).reshape(-1, *rest.shape)
+            self._where[mesh] = _nearest(self._own(mesh, rig.initial_raw_controls), rest)
+
+    def targets(self, groups):
+        """As the export finds them."""
+        return find_targets(self.rig, groups, "the face")[0]
+
+    def sum(self, weights):
+        """Mesh -> float64[V, 3], metres: the neutral and the targets by their weights."""
+        out = {}
+        for mesh, deltas in self._deltas.items():
+            on = np.array([weights.get(name, 0.0) for name in self.found.names(mesh)])
+            out[mesh] = self._rest[mesh] + np.tensordot(on, deltas, 1)
+        return out
+
+    def rig_at(self, raw):
+        """The same, of the evaluated rig."""
+        return {mesh: self._own(mesh, raw)[where] for mesh, where in self._where.items()}
+
+    def raws_of(self, take):
+        """float32[frames, R] of a take, mapped as clips are."""
+        clip, _ = importing.import_file(take, self.rig.raw_control_names, mapping="arkit")
+        raws = np.tile(self.rig.initial_raw_controls, (clip.frame_count, 1))
+        column = {name: i for i, name in enumerate(self.rig.raw_control_names)}
+        for name, curve in zip(clip.names, clip.curves, strict=True):
+            if name in column:
+                raws[:, column[name]] = curve
+        return raws
+
+    def _own(self, mesh, raw):
+        # The sample's axes are those of glTF; its unit is the centimetre.
+        return self._surface.positions(raw, self._number[mesh]).astype(np.float64) / 100
+
+
+def frames(path, take, *, lod, every):
+    """For each looked-at frame: mm of the sum, and of the driven sum, against the rig."""
+    dna, rig = risorius.load(path), risorius.compile_cached(path)
+    made = export(dna, rig, path, "face.glb", Wishes(shapes=("arkit",), lod=lod, within=0.5))
+    table = json.loads(made.files["face.combinations.json"])
+    posed = Posed(dna, rig, GlbFile(made.files["face.glb"]), lod)
+    units, raws, out = units_of(take), posed.raws_of(take), []
+    for frame in range(0, len(units), every):
+        own = posed.rig_at(raws[frame])
+        sums = (posed.sum(units[frame]), posed.sum(driven(units[frame], table)))
+        out.append([_apart(own, one) for one in sums])
+    return np.array(out)
+
+
+def _apart(a, b):
+    return max(1000 * float(np.linalg.norm(a[n] - b[n], axis=1).max()) for n in a)
+
+
+def _nearest(points, wanted):
+    """int64[n]: of each wanted place the point that is there; points of one place move alike."""
+    out = np.empty(len(wanted), np.int64)
+    for begin in range(0, len(wanted), 256):
+        part = wanted[begin : begin + 256]
+        out[begin : begin + 256] = (
+            np.square(points[None] - part[:, None]).sum(axis=2).argmin(axis=1)
+        )
+    return out
