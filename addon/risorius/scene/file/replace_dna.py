@@ -23,7 +23,7 @@ from ..base.blender_types import ArmatureObject, Context, MeshObject
 from ..character import armatures, board, board_bones, build, runtime, values
 from ..gaze import gaze_settings
 from ..lod import lods
-from ..skinning import ordinary
+from ..skinning import ordinary, skins
 from ..upkeep import duplicates
 from . import refit_joints, refit_meshes
 from .file_change import Change
@@ -125,6 +125,7 @@ def _exchange(context: Context, change: Change, fresh: ArmatureObject) -> None:
     build.remove(fresh)
     lods.show(rig)
     last_written.forget()
+    skins.forget({item.session_uid for item in parts.meshes_of(rig)})
     for item in (rig, parts.controls_there(rig), *parts.meshes_of(rig)):
         item.update_tag()
 

@@ -246,6 +246,7 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
     times.append(perf_counter())
     finished = []
     for item in parts.meshes_of(rig):
+        conditions.note_written(item)  # new maps of a material update all that wear it
         if not lods.shows(item, lod):
             continue
         if item.session_uid in plan.direct:

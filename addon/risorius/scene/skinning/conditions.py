@@ -50,13 +50,11 @@ class _Kept:
     Attributes:
         plan: Plan.
         signature: see _signature.
-        stacks: see _stacks.
         is_fresh: whether nothing was edited since.
     """
 
     plan: Plan
     signature: tuple[object, ...]
-    stacks: tuple[int, ...]
     is_fresh: bool = True
 
 
@@ -85,15 +83,9 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
     if rig.session_uid in _ordinary:
         return ORDINARY
     kept = _kept.get(rig.session_uid)
-    stacks = _stacks(rig)
-    if kept is None or not kept.is_fresh or kept.stacks != stacks:
-        kept = _kept[rig.session_uid] = _Kept(look(rig, live), _signature(rig), stacks)
+    if kept is None or not kept.is_fresh:
+        kept = _kept[rig.session_uid] = _Kept(look(rig, live), _signature(rig))
     return kept.plan
-
-
-def _stacks(rig: ArmatureObject) -> tuple[int, ...]:
-    """How many modifiers each mesh has: a script may add a simulation and go to the next frame."""
-    return tuple(len(item.modifiers) for item in parts.meshes_of(rig))
 
 
 def known(rig: ArmatureObject) -> Plan | None:

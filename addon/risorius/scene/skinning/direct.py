@@ -89,9 +89,16 @@ class Job:
     anew: bool
 
 
+# Deforming armature -> the plan that its meshes were last brought to.
+_settled: dict[int, conditions.Plan] = session.table("direct.settled", ("rewrite", "undo", "load"))
 # Deforming armature -> the Frame that was last written; what is compiled of the face.
 _shown: dict[int, Frame] = session.table("direct.shown", ("undo", "load"))
 _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
+
+
+def unsettle(rig: ArmatureObject) -> None:
+    """The modes of a face's meshes were changed. Args: rig  deforming armature."""
+    _settled.pop(rig.session_uid, None)
 
 
 def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
@@ -104,6 +111,9 @@ def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
     Returns:
         Whether a mesh changed its mode: what was last written says nothing of it then.
     """
+    if _settled.get(rig.session_uid) is plan:
+        return False
+    _settled[rig.session_uid] = plan
     changed = False
     for item in parts.meshes_of(rig):
         wanted = item.session_uid in plan.direct

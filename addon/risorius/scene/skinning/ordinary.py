@@ -53,6 +53,7 @@ def leave(rig: ArmatureObject) -> None:
         conditions.note_written(item)
         item.data.update_tag()
     last_written.inputs.pop(rig.session_uid, None)
+    direct.unsettle(rig)
 
 
 def is_unknown(rigs: Iterable[ArmatureObject]) -> bool:

@@ -62,9 +62,9 @@ _skins: dict[int, Skin] = session.table("skins.skins", ("load",))
 _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
 
 
-@session.at("rewrite", "undo")
+@session.at("undo")
 def doubt() -> None:
-    """Compare each skin with its mesh before it is used again: after undo, and before a frame."""
+    """Compare each skin with its mesh before it is used again."""
     _unsure.update(_skins)
 
 

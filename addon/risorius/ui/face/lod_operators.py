@@ -9,6 +9,7 @@ from ...scene.base import parts
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.frame import evaluate
 from ...scene.lod import lods
+from ...scene.skinning import conditions
 from ..blender_types import Context, Operator, Result
 from ..common import FaceOperator, face_rig
 from ..words import say
@@ -52,6 +53,8 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
             lods.show(rig, render=self.lod)
         else:
             lods.show(rig, self.lod, lods.render_level(rig))
+        for item in parts.meshes_of(rig):
+            conditions.note_written(item)  # what is shown now is evaluated, and not edited
         evaluate.bring_up(context, rig)
         return {"FINISHED"}
 
