@@ -704,6 +704,7 @@ def test_the_panel_shows_the_state_and_the_way_back(dna_file):
         "risorius.export_animation",
         "risorius.bake_physics",
         "risorius.export_web",
+        "risorius.export_game_face",
     ]
     bpy.ops.risorius.unbake()
     _bake(kind="CONTROLS")

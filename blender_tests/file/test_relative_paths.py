@@ -46,6 +46,7 @@ def _calls(folder):
         "mix_add": [(one, ""), (many, "")],
         "mix_write": [({"filepath": "//mix.dna", "use_import": False}, "mix.dna")],
         "export_web": [({"filepath": "//page.html", "use_animation": False}, "page.html")],
+        "export_game_face": [({"filepath": "//game.glb", "lod": 0}, "game.glb")],
         "import_dna": [(one, ""), (many, "")],
         "make_rig": [({"filepath": "//rig.dna", "joints": 2, "levels": 1}, "rig.dna")],
         "learn_range": [({"filepath": "//opens.rzc"}, "")],

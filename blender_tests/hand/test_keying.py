@@ -136,7 +136,7 @@ WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 # What moves no slider and no control bone, or keeps its own keys, by the reason.
 OTHERS = {
     "files, faces and what is shown of them": "add_character add_studio attach_body bake "
-    "bake_physics bring_back describe detach_body export_animation export_dna export_web "
+    "bake_physics bring_back describe detach_body export_animation export_dna export_web export_game_face "
     "import_dna install_speech make_override make_rig mix_add mix_add_scene mix_preview "
     "mix_remove mix_write reload replace_dna separate self_test set_lod set_lod_by_distance "
     "set_shape_mode test_channel unbake",
@@ -153,6 +153,9 @@ OTHERS = {
     "drivers; each side shows what it showed": "link_sides",
     "what is shown, and why": "frame_board frame_face heat hide_hints hide_joints hide_outlines "
     "mask_renders move_outlines mute set_strands show_all solo why_vertex",
+    "names of shape keys and of curves": "assign_curve assign_shape_key choose_curve "
+    "choose_shape_key load_shape_key_names save_curve_mapping save_shape_key_names "
+    "select_shape_key shape_key_pictures",
     "reads the controls": "copy_pose make_pose_assets save_expression update_expression "
     "render_thumbnails",
     "files of expressions": "rename_expression delete_expression star_expression "
