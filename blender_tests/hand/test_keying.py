@@ -136,7 +136,8 @@ WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 # What moves no slider and no control bone, or keeps its own keys, by the reason.
 OTHERS = {
     "files, faces and what is shown of them": "add_character add_studio attach_body bake "
-    "bake_physics bring_back describe detach_body export_animation export_dna export_web export_game_face "
+    "bake_physics bring_back describe detach_body export_animation export_dna export_web "
+    "export_game_face "
     "import_dna install_speech make_override make_rig mix_add mix_add_scene mix_preview "
     "mix_remove mix_write reload replace_dna separate self_test set_lod set_lod_by_distance "
     "set_shape_mode test_channel unbake",
