@@ -113,6 +113,7 @@ def masked(_rig, head):
 
 def _own_key(head):
     block = head.shape_key_add(name="mine", from_mix=False)
+    block.value = 0.0  # Blender 5 gives a new key the value 1
     for point in block.points[:30]:
         point.co.x += 0.02
     return block
