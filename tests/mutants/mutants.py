@@ -40,7 +40,7 @@ SEED = 15
 COUNTS = {"native": 80, "package": 60, "scene": 60}
 # Headers stay out: each is a build of all that includes it. Bindings are tables of names.
 SOURCES = {
-    "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*"]),
+    "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*", "native/web/*"]),
     "package": (["native/python/risorius/**/*.py", "native/python/risorius_people/**/*.py"], []),
     "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
 }

@@ -12,7 +12,13 @@ import risorius.cli
 ROOT = Path(risorius.cli.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]+")
 # Modules that are a part of a command of another name.
-PARTS = {"eval_clip": ["eval"], "diff": ["info"], "authoring": ["author"], "ranges": ["clip"]}
+PARTS = {
+    "eval_clip": ["eval"],
+    "diff": ["info"],
+    "authoring": ["author"],
+    "ranges": ["clip"],
+    "files": ["convert", "edit"],
+}
 
 
 @pytest.fixture(scope="module")

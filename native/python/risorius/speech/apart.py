@@ -226,7 +226,7 @@ def serve(task: dict[str, Any]) -> None:
             task["path"],
             task["transcript"],
             progress=lambda share: tell(share=share),
-            **{**task["options"], "library": _library(task["options"]["library"])},
+            **{**task["options"], "library": _library(task["options"].get("library"))},
         )
         curves = base64.b64encode(np.ascontiguousarray(clip.curves, "<f4").tobytes())
         tell(

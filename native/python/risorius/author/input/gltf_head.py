@@ -14,6 +14,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ...base.errors import RisoriusError
 from ...importing.errors import AnimationFileError
 from ...importing.gltf import Document
 from ...importing.source import read_bytes
@@ -193,5 +194,5 @@ def _image_bytes(document: Document, image: Mapping[str, Any], place: str) -> by
         raise _PictureError(str(error)) from error
 
 
-class _PictureError(Exception):
+class _PictureError(RisoriusError):
     """A picture in a file of its own that cannot be read: a face can do without."""
