@@ -244,6 +244,23 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         rig.update_tag(refresh={"OBJECT"})
     values.write(rig, pose.animated_maps, pose.blend_shapes, live_keys.bears_simulation)
     times.append(perf_counter())
+    shape = direct.Shape(pose.joints, pose.blend_shapes, turns)
+    _write_meshes(rig, live, shape, plan, lod, anew, moment in _BEFORE_FRAME)
+    times.append(perf_counter())
+    timing.add(times)
+    return True
+
+
+def _write_meshes(
+    rig: ArmatureObject,
+    live: runtime.Runtime,
+    shape: direct.Shape,
+    plan: conditions.Plan,
+    lod: int,
+    anew: bool,
+    ahead: bool,
+) -> None:
+    """Write the live keys of the meshes of a level. Args: see direct.prepare, live_keys.write."""
     finished = []
     for item in parts.meshes_of(rig):
         conditions.note_written(item)  # new maps of a material update all that wear it
@@ -252,13 +269,9 @@ def evaluate(rig: ArmatureObject, depsgraph: Depsgraph, moment: Moment = Moment.
         if item.session_uid in plan.direct:
             finished.append(item)
         else:
-            live_keys.write(item, live, pose.blend_shapes, anew, moment in _BEFORE_FRAME)
+            live_keys.write(item, live, shape.weights, anew, ahead)
     if finished:
-        shape = direct.Shape(pose.joints, pose.blend_shapes, turns)
         _write_finished(direct.prepare(rig, live, shape, finished, anew))
-    times.append(perf_counter())
-    timing.add(times)
-    return True
 
 
 def _write_finished(job: direct.Job) -> None:
