@@ -39,12 +39,19 @@ class Bare:
 
     def begin(self):
         """Disable the modifiers of what gets finished positions: the add-on enabled them."""
+        self._switch(False)
+
+    def end(self):
+        """Enable them again: the add-on would take them for disabled by the user."""
+        self._switch(True)
+
+    def _switch(self, on):
         for rig_name, bones, keys in self.poses[0]:
             for item_name, _points in keys if not bones else ():
                 for modifier in bpy.data.objects[item_name].modifiers:
                     ours = modifier.type == "ARMATURE" and modifier.object.name == rig_name
-                    if ours and modifier.show_viewport:
-                        modifier.show_viewport = False
+                    if ours and modifier.show_viewport != on:
+                        modifier.show_viewport = on
 
     def write(self, *_arguments):
         """Write the next pose; a handler of Blender may call it."""

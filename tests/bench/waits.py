@@ -95,6 +95,7 @@ def measure_frames(path, package, counts, frames, mode):
             bpy.app.handlers.frame_change_post.append(bare.write)
             times = statistics.median(frame_time.step(frames))
             bpy.app.handlers.frame_change_post.remove(bare.write)
+            bare.end()
             return times
 
         ours, floor = in_turn(package, lambda: statistics.median(frame_time.step(frames)), alone)
@@ -138,11 +139,13 @@ def measure_slider(path, package, rounds, mode):
         bpy.context.view_layer.update()
 
     bare_drag = Slider(controls, written)
-    ours, floor = in_turn(
-        package,
-        lambda: (median_ms(drag, rounds), *measure_undo(drag)),
-        lambda: (median_ms(bare_drag, rounds), *measure_undo(bare_drag)),
-    )
+
+    def floors():
+        found = (median_ms(bare_drag, rounds), *measure_undo(bare_drag))
+        bare.end()
+        return found
+
+    ours, floor = in_turn(package, lambda: (median_ms(drag, rounds), *measure_undo(drag)), floors)
     waits = ("a slider's step to the evaluated mesh", "undo of a slider's step", "redo of it")
     for wait, own, bare_own in zip(waits, ours, floor, strict=True):
         row(wait, own, bare_own)

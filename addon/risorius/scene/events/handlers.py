@@ -290,6 +290,12 @@ def _restored(*_arguments: object) -> None:
 
 
 @persistent
+def _undone(*_arguments: object) -> None:
+    conditions.note_restored()
+    _restored()
+
+
+@persistent
 def _before_restoring(*_arguments: object) -> None:
     """Before load, undo and redo: what is freed by them is let go."""
     session.end("free")
@@ -356,8 +362,8 @@ _HANDLERS = (
     ("undo_pre", _before_restoring),
     ("redo_pre", _before_restoring),
     ("load_post", _loaded),
-    ("undo_post", _restored),
-    ("redo_post", _restored),
+    ("undo_post", _undone),
+    ("redo_post", _undone),
     ("blend_import_post", _imported),
     ("save_pre", _before_save),
     ("save_post", _saved),

@@ -65,6 +65,7 @@ _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
 # Scene and view layer -> the last write that an update of its graph told of.
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
+_restored = session.value("conditions.restored", False, ("load",))
 # Datablock that is no object -> number of its drivers when it was last updated.
 _drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
 # Objects of the user's -> what they point to, see _pointed.
@@ -252,7 +253,15 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
         if own or armature:
             last_written.inputs.pop(rig.session_uid, None)  # of other weights, or another rest form
     look_quickly()
+    if _restored.now:  # undo made them anew; skins.doubt knows which may be others
+        _restored.now = False
+        return set()
     return edits.meshes
+
+
+def note_restored() -> None:
+    """Undo and redo are told as an update of all that they made anew, which is no edit."""
+    _restored.now = True
 
 
 def look_quickly() -> None:

@@ -60,16 +60,22 @@ class Skin:
 _bones: dict[int, Bones] = session.table("skins.bones", ("rewrite", "undo", "load"))
 _skins: dict[int, Skin] = session.table("skins.skins", ("load",))
 _unsure: set[int] = session.keep("skins.unsure", set, ("load",))
+# Mesh objects that somebody edited since the file was opened.
+_edited: set[int] = session.keep("skins.edited", set, ("load",))
 
 
 @session.at("undo")
 def doubt() -> None:
-    """Compare each skin with its mesh before it is used again."""
-    _unsure.update(_skins)
+    """Compare skins with their meshes before they are used again.
+
+    Those of meshes that nobody edited since the file was opened are what they were.
+    """
+    _unsure.update(_edited & _skins.keys())
 
 
 def forget(uids: set[int]) -> None:
     """Meshes were edited. Args: uids  of the mesh objects."""
+    _edited.update(uids)
     for uid in uids:
         _skins.pop(uid, None)
         meshes.note_edit(uid)
