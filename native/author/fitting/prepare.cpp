@@ -134,8 +134,8 @@ void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
                 std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;
   const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
-  // Several may lie at one place, such as the joints of a lid in the eye's middle: then what they
-  // do tells which belong together. Each is one other's, never two's.
+  // Several joints may lie at one place: those of a lid lie in the middle of the eye. Their motions
+  // then tell which two mirror each other. A joint mirrors one other joint at most.
   std::vector<bool> taken(joints.size(), false);
   for (std::uint32_t j = 0; j < joints.size(); ++j) {
     taken[j] = j < given.size() && given[j].mirrored != GivenJoint::kUnknown;

@@ -24,7 +24,7 @@ std::vector<std::int32_t> parents_argument(const py::object& object) {
   std::vector<std::int32_t> parents;
   for (py::ssize_t i = 0; i < wide.size(); ++i) {
     const std::int64_t parent = wide.data()[i];
-    // Of what does not fit, make_joint_chain says that there is no such bone.
+    // A parent that 32 bits cannot hold is no bone: make_joint_chain refuses the clamped number.
     parents.push_back(static_cast<std::int32_t>(
         std::clamp<std::int64_t>(parent, std::numeric_limits<std::int32_t>::min(),
                                  std::numeric_limits<std::int32_t>::max())));

@@ -218,8 +218,9 @@ def rig_task(
 
 
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
-    """The materials of what a face was made from on its meshes of LOD 0, whose polygons are the
-    same in the same order.
+    """Give the meshes of LOD 0 the materials of the objects that the face was made from.
+
+    Both have the same polygons in the same order.
 
     Args:
         meshes: of the face.

@@ -235,5 +235,5 @@ def weights_of(value: str) -> Mapping[str, float]:
 
 
 def is_editable(item: bpy.types.Object) -> bool:
-    """Whether what the user says can be kept: not on a mesh of another file."""
+    """Whether names can be stored on a mesh: a mesh that is linked from another file takes none."""
     return item.data is not None and item.data.is_editable

@@ -208,7 +208,7 @@ def sample_path(value: str) -> Path:
 
 
 def without_picture(values: Sequence[str]) -> list[str]:
-    """Of what keys may be those whose picture is not there, each picture once.
+    """The meanings of keys that have no picture yet, each picture once.
 
     Args:
         values: as assigned.Choice says them.

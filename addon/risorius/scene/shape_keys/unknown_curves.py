@@ -68,7 +68,7 @@ def keep(controls: ArmatureObject, found: Unknown) -> None:
 
 
 def put(controls: ArmatureObject, name: str, value: str | None) -> None:
-    """Keep what the user says that a curve is.
+    """Store the meaning that the user gave to a curve of an imported file.
 
     Args:
         controls: the control armature.

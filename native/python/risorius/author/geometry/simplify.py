@@ -74,17 +74,29 @@ def pieces_of(mesh: Mesh) -> Ints:
     count = len(mesh.positions)
     _, own = np.unique(np.asarray(mesh.positions), axis=0, return_inverse=True)
     corners = own.ravel()[np.asarray(mesh.layout_positions, np.int64)[fan_triangles(mesh)]]
-    label = np.arange(count)
-    while True:
-        least = label.copy()
-        lowest = label[corners].min(axis=1) if len(corners) else np.zeros(0, np.int64)
-        for k in range(3):
-            np.minimum.at(least, corners[:, k], lowest)
-        least = least[least]
-        if (least == label).all():
-            break
-        label = least
+    label = connected(count, corners.ravel(), np.full(len(corners), 3))
     return np.asarray(np.unique(label[own.ravel()], return_inverse=True)[1].ravel(), np.int64)
+
+
+def connected(count: int, corners: Ints, sizes: Ints) -> Ints:
+    """int64[count]: the least vertex of the piece that each vertex belongs to.
+
+    Args:
+        count: of the vertices.
+        corners: int64, the vertices of all polygons, one polygon after the other.
+        sizes: int64[polygons], how many of them each has.
+    """
+    label = np.arange(count)
+    begins = np.cumsum(sizes) - sizes
+    while len(sizes):
+        least = np.minimum.reduceat(label[corners], begins)
+        new = label.copy()
+        np.minimum.at(new, corners, np.repeat(least, sizes))
+        new = new[new]
+        if np.array_equal(new, label):
+            break
+        label = new
+    return label
 
 
 def fewer_triangles(mesh: Mesh, attributes: Floats, vertices: int) -> Ints:

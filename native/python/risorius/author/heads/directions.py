@@ -207,7 +207,7 @@ class _Look:
         return vote
 
     def _near(self, centers: Doubles, across: Doubles) -> Ints:
-        """Numbers of vertices around what moves: the face without the back of the head."""
+        """Indices of the vertices near those that shapes move: the face, no back of the head."""
         middle = np.median(centers, axis=0)
         reach = 0.35 * max(float(np.ptp(self.points @ across)), 1e-9)
         away = self.points - middle

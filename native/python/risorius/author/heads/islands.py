@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.words import joined
+from ..geometry.simplify import connected
 from ..geometry.skeleton import Doubles, Ints
 from ..input.obj import ObjMesh
 from .parts import HeadPart, Material, first_vertices, taken_apart
@@ -29,21 +30,10 @@ class Ball:
 
 def islands_of(mesh: ObjMesh) -> Ints:
     """int64[V]: the number of the island of each vertex, from 0 in the order of vertices."""
-    count = len(mesh.positions)
-    label = np.arange(count)
-    if mesh.faces:
-        sizes = np.array([len(face) for face in mesh.faces])
-        corners = np.concatenate([np.asarray(face, np.int64) for face in mesh.faces])
-        begins = np.cumsum(sizes) - sizes
-        while True:
-            least = np.minimum.reduceat(label[corners], begins)
-            new = label.copy()
-            np.minimum.at(new, corners, np.repeat(least, sizes))
-            new = np.minimum(new, new[new])
-            new = new[new]
-            if np.array_equal(new, label):
-                break
-            label = new
+    sizes = np.array([len(face) for face in mesh.faces], np.int64)
+    none = np.zeros(0, np.int64)
+    corners = np.concatenate([none, *(np.asarray(face, np.int64) for face in mesh.faces)])
+    label = connected(len(mesh.positions), corners, sizes)
     return np.unique(label, return_inverse=True)[1].ravel()
 
 
