@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the bytes of a DNA file to a character in the scene, or to nothing at all."""
+"""From the bytes of a DNA file to a complete character in the scene, or to no change."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from . import armatures, meshes, runtime, values
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """What the user chose.
+    """Options of an import.
 
     Attributes:
         lods: levels whose meshes are built.
         mode: LIVE, KEYS or AUTO.
         normals: keep the file's normals.
         materials: build materials.
-        textures: load the textures that lie beside the file.
-        texture_folder: looked into first; empty for none.
-        simple_materials: without subsurface, relief and animated maps.
+        textures: load textures beside the file.
+        texture_folder: folder to search first; empty for none.
+        simple_materials: make materials without subsurface, relief and animated maps.
         unit: metres per Blender unit; None takes the scene's.
-        nearest_lods: where the file has none of the levels, build its finest instead.
+        nearest_lods: build the finest level of the file if it has none of the chosen levels.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -49,13 +49,13 @@ class BuildOptions:
 
 @dataclass(frozen=True)
 class _File:
-    """What was read and compiled once.
+    """A file, read and compiled once.
 
     Attributes:
         path: of the file.
         content: its bytes.
-        dna: what was read from them.
-        rig: the risorius.Rig of it.
+        dna: the Dna of these bytes.
+        rig: its risorius.Rig.
     """
 
     path: Path
