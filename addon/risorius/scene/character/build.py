@@ -91,7 +91,7 @@ def import_file(
 
     Raises:
         DnaError: the file is bad or cannot be read.
-        PlanError, SpaceError: there is no character in it.
+        PlanError, SpaceError: the file has no character.
     """
     file = _read(path)
     dna = file.dna
@@ -168,11 +168,11 @@ def _first(plan: plans.CharacterPlan) -> int:
 
 
 def settle(context: Context, *items: bpy.types.Object) -> None:
-    """Bring new custom properties to the evaluated copies.
+    """Update the evaluated copies after adding custom properties.
 
     Args:
-        context: its view layer is brought up to date.
-        items: the objects whose properties are new.
+        context: its view layer is updated.
+        items: objects with new properties.
     """
     for item in items:
         item.update_tag()
@@ -213,7 +213,8 @@ def _source(path: Path) -> str:
 def _find_textures(
     plan: plans.CharacterPlan, path: Path, options: BuildOptions
 ) -> texture_search.TexturePlan:
-    """The textures beside the file and in the chosen folder; none where none are wanted."""
+    """The textures beside the file and in the chosen folder; empty if the options exclude
+    textures."""
     if not options.textures:
         return texture_search.TexturePlan()
     chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
@@ -298,7 +299,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
 
 def remove(rig: ArmatureObject) -> None:
-    """Take a character and all that belongs to it out of the file; what a copy of it uses stays."""
+    """Remove a character and its data from the file; data that a copy of it uses stay."""
     controls = parts.controls_of(rig)
     text = storage.text_of(rig)
     items = parts.meshes_of(rig)
@@ -317,7 +318,7 @@ def remove(rig: ArmatureObject) -> None:
 
 
 def _remove(made: Iterable[bpy.types.ID | None]) -> None:
-    """Remove those datablocks that still live."""
+    """Remove datablocks that still exist."""
     alive = []
     for item in dict.fromkeys(made):
         try:

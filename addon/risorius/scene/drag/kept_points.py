@@ -47,16 +47,16 @@ def put(rig: ArmatureObject, kind: str, points: Iterable[Point]) -> None:
 
 
 def toggle(rig: ArmatureObject, kind: str, point: Point, counts: list[int]) -> bool:
-    """Add a point, or take it out where it is there.
+    """Add a point, or remove it if it is stored.
 
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        point: of it.
-        counts: as for `of`.
+        point: point of the character.
+        counts: see `of`.
 
     Returns:
-        Whether it is there now.
+        Whether it is stored now.
     """
     points = of(rig, kind, counts)
     if point in points:

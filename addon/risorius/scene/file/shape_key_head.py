@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes with shape keys of any make as what a joint rig is made from."""
+"""Meshes with shape keys as the input of a joint rig."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Doubles = NDArray[np.float64]
 
 
 class HeadError(FaceError, ValueError):
-    """A mesh that no rig can be made of; the sentence says why."""
+    """No rig can be made from a mesh; the sentence gives the reason."""
 
 
 def usable_head(item: bpy.types.Object | None) -> bool:
@@ -34,28 +34,28 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The active object if it is a mesh with shape keys, else the first that is selected."""
+    """The active object if it is a mesh with shape keys, or the first selected one."""
     there = [context.active_object, *context.selected_objects]
     return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 
 
 def taken_with(context: Context, head: MeshObject) -> list[MeshObject]:
-    """The head, and all other meshes that are selected.
+    """The head and all other selected meshes.
 
     Args:
         context: has the selection.
-        head: of head_of.
+        head: from head_of.
     """
     others = [item for item in context.selected_objects if item != head and _is_plain(item)]
     return [head, *(cast(MeshObject, item) for item in others)]
 
 
 def relatives_of(context: Context, taken: Sequence[MeshObject]) -> list[MeshObject]:
-    """The visible meshes that have an armature or a parent in common with those that are taken.
+    """The visible meshes that share an armature or a parent with the chosen meshes.
 
     Args:
         context: has the view.
-        taken: of taken_with.
+        taken: from taken_with.
     """
     above = {owner for item in taken for owner in _owners(item)}
     return [
@@ -73,7 +73,7 @@ def _is_plain(item: bpy.types.Object) -> bool:
 
 
 def _owners(item: bpy.types.Object) -> set[bpy.types.Object]:
-    """What an object hangs on or is deformed by."""
+    """The parents and armatures of an object."""
     found = {cast(bpy.types.ArmatureModifier, m).object for m in item.modifiers
              if m.type == "ARMATURE"}  # fmt: skip
     return {owner for owner in (*found, item.parent) if owner is not None}
@@ -88,15 +88,15 @@ def shapes_of(
 ) -> native.ShapeSet:
     """A head and its shape keys as risorius.author.input.shape_face.ShapeSet, in cm with y up.
 
-    Rotation and size of the objects count, the place of the head does not. A key is what it adds to
-    the key that it is relative to; muted ones are left out.
+    Rotation and scale of the objects are applied, the location of the head is not. A key counts as
+    its difference from its relative key. Muted keys are left out.
 
     Args:
-        context: the scene says what a unit is.
+        context: its scene gives the unit.
         item: has shape keys, see usable_head.
         others: meshes that belong to the head: teeth, eyes, hair.
-        height_mm: of the face from the chin to the top; 0: as large as it is.
-        said: what the user said that keys are, as risorius.author.input.said.
+        height_mm: height of the face from the chin to the top; 0: keep its size.
+        said: the user's assignments of keys, see risorius.author.input.said.
 
     Raises:
         HeadError: the keys are not relative, or the mesh has no polygons.
@@ -173,19 +173,19 @@ def rig_task(
     keep: bool = True,
     said: Mapping[str, str | list[str]] | None = None,
 ) -> Task[tuple[native.JointRig, list[str]]]:
-    """The making of a joint rig, which ends with the file; a cancelled one leaves none.
+    """The task that makes a joint rig and writes its file; a cancelled task leaves no file.
 
     Args:
-        shapes: as shapes_of gives them.
+        shapes: from shapes_of.
         path: of the DNA file.
-        joints: new ones.
-        levels: of detail.
-        tolerance_mm: blend shapes keep what joints leave beyond it; None: a share of the height.
+        joints: number of new joints.
+        levels: number of levels of detail.
+        tolerance_mm: largest error of joints without a blend shape; None: a share of the height.
         keep: whether there are blend shapes; False: joints alone.
-        said: what the user said that keys are, as risorius.author.input.said.
+        said: the user's assignments of keys, see risorius.author.input.said.
 
     Returns:
-        A task whose result is risorius.author.JointRig and what is odd, a sentence each.
+        A task whose result is risorius.author.JointRig and sentences about oddities.
     """
     author = native.part("author")
     face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
@@ -218,13 +218,13 @@ def rig_task(
 
 
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:
-    """Give the meshes of LOD 0 the materials of the objects that the face was made from.
+    """Give the meshes of LOD 0 the materials of their source objects.
 
     Both have the same polygons in the same order.
 
     Args:
-        meshes: of the face.
-        shapes: what it was made from, of shapes_of.
+        meshes: meshes of the face.
+        shapes: the input of the face, from shapes_of.
     """
     for number, part in enumerate(shapes.parts):
         item = bpy.data.objects.get(part.source)

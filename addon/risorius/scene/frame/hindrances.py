@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What keeps a face from doing what its controls say, in words for the panel."""
+"""Reasons why a face does not follow its controls, as sentences for the panel."""
 
 from __future__ import annotations
 
