@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes and shape keys of one file become those of another, in the same objects and datablocks."""
+"""Replacing meshes and shape keys of one file by another in the same objects and datablocks."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ _BOUND = {
 
 @dataclass
 class Shape:
-    """Positions of a mesh object as the user left them.
+    """Positions of a mesh object with the user's edits.
 
     Attributes:
         points: float32[V, 3] the basis.
         moved: float64[V, 3] the user's edit of the basis.
-        keys: key name -> float32[V, 3]; without those of ours that are as in the file.
-        relative: key name -> name of the key it is relative to.
-        channels: name of a key of ours -> its old channel.
-        edits: name of an edited key of ours -> float64[V, 3].
+        keys: key name -> float32[V, 3]; without unedited keys of Risorius.
+        relative: key name -> name of its relative key.
+        channels: name of a key of Risorius -> its old channel.
+        edits: name of an edited key of Risorius -> float64[V, 3].
         own: the user's keys.
     """
 
@@ -54,14 +54,14 @@ class Shape:
 
 
 def replace_meshes(change: Change, fresh_meshes: Mapping[int, MeshObject]) -> set[int]:
-    """Move the new file's meshes into the objects that are there.
+    """Move the new file's meshes into the existing objects.
 
     Args:
         change: file_change.Change.
-        fresh_meshes: new mesh number -> the object that was built for it.
+        fresh_meshes: new mesh index -> its new object.
 
     Returns:
-        The new mesh numbers that have found an object.
+        The new mesh indices with an existing object.
     """
     moved = change.mesh_map()
     old_plans = {m.index: m for m in change.old.meshes}

@@ -16,7 +16,8 @@ _LEANS = 1e-4  # cosine of the angle between two axes of a place from which it c
 
 
 def words(rig: ArmatureObject) -> Iterator[str]:
-    """Sentences on what leads in place of the controls. Args: rig  deforming armature."""
+    """Sentences about animation that leads instead of the controls. Args: rig deforming
+    armature."""
     controls = parts.controls_of(rig)
     if controls is None or parts.BAKED in rig:
         return
