@@ -155,7 +155,6 @@ def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
     Args:
         now: of the face.
         controls: indices in raw | corrective | network | pose of active controls.
-            pose of active controls.| corrective | network | pose, that are on.
     """
     live = now.live
     if not controls:
