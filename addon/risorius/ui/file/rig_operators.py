@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""A head with shape keys becomes a face: joints that do what its shapes did."""
+"""Making a face with joints from a head with shape keys."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -123,7 +123,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         return words.say("No rig was made.")
 
     def finish(self, context: Context) -> Result:
-        """Import what was written; the head stays, and lends its materials."""
+        """Import the written face; the head stays and its materials are reused."""
         task = self._task
         try:
             if task.result is None:
@@ -155,7 +155,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         return {"FINISHED"}
 
     def _take_place(self, context: Context, before: set[bpy.types.Object]) -> None:
-        """Beside the head, and with its materials."""
+        """Put the new face beside the head, with its materials."""
         head = bpy.data.objects.get(self._head)
         made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
         if head is None or made is None:
@@ -201,7 +201,7 @@ def _named(items: Sequence[MeshObject]) -> list[str]:
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:
-    """Entry of the menu beside the list of shape keys, and of Object."""
+    """Entry of the menu beside the list of shape keys, and of the menu Object."""
     self.layout.separator()
     self.layout.operator(RISORIUS_OT_make_rig.bl_idname, icon="ARMATURE_DATA")
 
