@@ -19,7 +19,7 @@ _FACING = 0.4  # least cosine between normals of places that may be the same
 _FARTHEST = 1.5  # cm
 _NEAR = 0.3  # cm: a place so far off holds its value a third as much
 _UNSURE = 0.5  # of a sure vertex: how much one holds that registration carried along with others
-_EVENED = 0.1  # cm, over which values are evened out
+_EVENED = 0.05  # cm, over which values are evened out
 _AT_REST = 1e-7  # of the area: what hangs on no known place rests
 
 
