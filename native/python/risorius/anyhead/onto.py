@@ -34,7 +34,7 @@ from .laying import lay
 from .repair import repair
 from .standing import Standing, stand
 from .surface import Surface
-from .transfer.template import Pose, Progress, read_template
+from .transfer.template import Floats, Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
@@ -119,10 +119,10 @@ def onto(
          f"{len(target.points):,} of the head")  # fmt: skip
     laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
     tell(f"carrying {counted(len(source.ways), 'expression')} over")
-    ways = transfer(source, target, laid.points, laid.trust, TransferOptions(o.strength, o.threads),
-                    _part(progress, _LAID, _CARRIED)).ways  # fmt: skip
-    fitted = complete(found, template, laid.points)
-    mended = _mended(target, fitted, head, whole_ways(ways), o, _part(progress, _CARRIED, 1.0), tell)
+    carried = transfer(source, target, laid.points, laid.trust,
+                       TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED))  # fmt: skip
+    fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
+    mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
     every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
     every[0].shapes |= {"+".join(p): way for p, way in mended.items() if len(p) > 1}
     joined = join(
@@ -188,7 +188,7 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
     return Read(dna, Assignment({}, {}, {}, []), made.notes + odd, materials, shapes.kept)
 
 
-def whole_ways(ways: Mapping[Pose, Doubles]) -> dict[Pose, Doubles]:
+def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
     """float64[V, 3] by pose, the whole way of all its controls, of what transfer gives.
 
     Args:

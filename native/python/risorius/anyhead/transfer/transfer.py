@@ -97,7 +97,7 @@ def _tell(progress: Progress | None, share: float) -> None:
 
 
 def _parting(face: TemplateFace, ways: dict[Pose, Doubles]) -> Doubles | None:
-    """float64[T, n, 3]: ways in which lips and lids part; the longest where none has such a name."""
+    """float64[T, n, 3]: ways in which lips and lids part; the longest where no name is known."""
     named: list[Pose] = [(name,) for name in _PARTING if (name,) in ways]
     far = {pose: float(np.square(way).sum()) for pose, way in face.ways.items() if len(pose) == 1}
     chosen = named or sorted(far, key=lambda pose: -far[pose])[: len(_PARTING)]

@@ -168,9 +168,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _read(
-    spec: Spec, args: argparse.Namespace, say: _Clock
-) -> tuple[Read, dict[Path, bytes]]:
+def _read(spec: Spec, args: argparse.Namespace, say: _Clock) -> tuple[Read, dict[Path, bytes]]:
     """The face of shapes, and files that are to be written beside it."""
     return (read_face(spec), {}) if args.onto is None else read_onto(args, say)
 
