@@ -119,8 +119,8 @@ def onto(
          f"{len(target.points):,} of the head")  # fmt: skip
     laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
     tell(f"carrying {counted(len(source.ways), 'expression')} over")
-    carried = transfer(source, target, laid.points, laid.trust,
-                       TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED))  # fmt: skip
+    wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
+    carried = transfer(source, target, laid.points, laid.trust, wanted, rest)
     fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
     mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
     every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
