@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
-from .fitting import FINE, PLACE, ROUGH, Held, Pose, Target, fit, form_normals
+from .fitting import FINE, PLACE, ROUGH, Held, Pose, Target, fit, pose_normals
 from .heads import HeadForm, head_form
 
 TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
@@ -83,10 +83,10 @@ def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> floa
     """
     face = np.flatnonzero(form.weights[: form.skin] > 0.6)
     face = face[:: max(1, len(face) // count)]
-    points = pose.points(form)
-    normals = form_normals(form, points)[face]
-    found, near, _ = target.pairs(points[face], normals, 0.5, 2 * _FAR * pose.scale)
-    away = np.linalg.norm(points[face] - near, axis=1) / pose.scale
+    shaped = form.shaped(pose.parts, pose.expressions)
+    normals, points = pose_normals(form, pose, shaped)[face], pose.place(shaped[face])
+    found, near, _ = target.pairs(points, normals, 0.5, 2 * _FAR * pose.scale)
+    away = np.linalg.norm(points - near, axis=1) / pose.scale
     return float(np.where(found, np.minimum(away, _FAR), _FAR).mean())
 
 
