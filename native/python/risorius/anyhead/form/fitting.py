@@ -124,7 +124,10 @@ class Step:
     expressions: bool = True
 
 
-PLACE = (Step(8, 4.0, 260, 0, expressions=False),)
+PLACE = (
+    Step(3, 4.0, 200, 0, expressions=False),
+    Step(6, 4.0, 300, 0, expressions=False),
+)
 ROUGH = (Step(6, 2.0, 500, 6, 4.0), Step(6, 1.2, 700, 14, 3.0))
 FINE = (
     Step(6, 0.9, 1600, 24, 2.0, 0.4),
