@@ -23,6 +23,7 @@ _CORNER = 4.0  # mm beyond a corner: what goes none of it
 _CLEAR = 0.3  # mm above the eye at rest: what is outside of it, no rim that touches
 _SKIN = 0.5  # mm above the eye, least of what was further from it
 _PRESSED = 0.1  # mm that edges overlap which are brought together
+_BESIDE = 0.5  # mm beyond the edges, where the eye is seen between lids still
 _THROUGH = 0.8  # mm that the edges of closed lids may overlap
 _LOWER = 0.15  # of the gap: what the lower lid takes
 _ROUNDS = 6
@@ -54,12 +55,15 @@ class Eyelids:
         """
         self.ball, self.opening = ball, opening
         self.mm = ball.radius / _RADIUS_MM  # what a millimetre of a human eye is here
-        self.rest = skin.points
-        self._lids = near_eye(skin, ball)
-        near = np.unique(self._lids.triangles)
+        lids = near_eye(skin, ball)
+        near, triangles = np.unique(lids.triangles, return_inverse=True)
+        self._around = skin.points[near]  # lids, and the corners of triangles that end in them
+        self._triangles: Ints = triangles.reshape(-1, 3)
         across, up, away = opening.frame.angles(skin.points[near])
         lid = (away < FAR * ball.radius) & (np.abs(up) < _WIDE) & (away > 0.8 * ball.radius)
         self.vertices = near[lid]
+        self._lid = np.flatnonzero(lid)
+        self.rest = skin.points[self.vertices]
         across, up, away = across[lid], up[lid], away[lid]
         self._above = up > opening.line(across)
         self.upper, self.lower = self.vertices[self._above], self.vertices[~self._above]
@@ -87,13 +91,18 @@ class Eyelids:
 
     def _number(self) -> None:
         """Edges and triangles of the lids by their own numbers."""
-        place = np.full(len(self.rest), -1)
-        place[self.vertices] = np.arange(len(self.vertices))
-        own = place[self._lids.triangles]
-        self._own = own  # -1: no lid
-        whole: Ints = own[(own >= 0).all(axis=1)]
+        place = np.full(len(self._around), -1)
+        place[self._lid] = np.arange(len(self._lid))
+        self._own = place[self._triangles]  # -1: no lid
+        whole: Ints = self._own[(self._own >= 0).all(axis=1)]
         sides = np.sort(whole[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         self._edges: Ints = np.unique(sides, axis=0)
+
+    def _posed(self, points: Doubles) -> ClosestPoints:
+        """The skin near the eye with lids at other places."""
+        posed = self._around.copy()
+        posed[self._lid] = points
+        return ClosestPoints(posed, np.ascontiguousarray(self._triangles, np.int32))
 
     def rim(self, reach: float) -> tuple[Ints, Doubles]:
         """Vertices of both edges that lie on the eye at rest, and float64[n] how high above it.
@@ -122,7 +131,7 @@ class Eyelids:
             displacement: float64[V, 3], of the whole target.
             turn: float64[3, 3], what the eye is turned by; None: it rests.
         """
-        return self._gap(self.rest[self.vertices] + displacement[self.vertices], turn)
+        return self._gap(self.rest + displacement[self.vertices], turn)
 
     def cut(self, displacement: Doubles, turn: Doubles | None = None) -> float:
         """How deep the outside of the lids lies in the eye, in the target's unit.
@@ -131,7 +140,7 @@ class Eyelids:
             displacement: float64[V, 3], of the whole target.
             turn: float64[3, 3], what the eye is turned by; None: it rests.
         """
-        points = self.rest[self.vertices] + displacement[self.vertices]
+        points = self.rest + displacement[self.vertices]
         return float(self._lacks(points, turn, 0.0).max(initial=0.0))
 
     def closed(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
@@ -142,8 +151,8 @@ class Eyelids:
             turn: float64[3, 3], what the eye is turned by; None: it rests.
         """
         frame = self.opening.frame
-        rest_up = frame.angles(self.rest[self.vertices])[1]
-        points = self.rest[self.vertices] + displacement[self.vertices]
+        rest_up = frame.angles(self.rest)[1]
+        points = self.rest + displacement[self.vertices]
         best, least = points, np.inf
         for number in range(_ROUNDS):
             across, up, away = frame.angles(points)
@@ -163,7 +172,7 @@ class Eyelids:
             if wrong < least:
                 best, least = points, wrong
         out = displacement.copy()
-        out[self.vertices] = best - self.rest[self.vertices]
+        out[self.vertices] = best - self.rest
         return out
 
     def lifted(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
@@ -173,20 +182,20 @@ class Eyelids:
             displacement: float64[V, 3], of the whole target.
             turn: float64[3, 3], what the eye is turned by; None: it rests.
         """
-        points = self._lifted(self.rest[self.vertices] + displacement[self.vertices], turn)
+        points = self._lifted(self.rest + displacement[self.vertices], turn)
         out = displacement.copy()
-        out[self.vertices] = points - self.rest[self.vertices]
+        out[self.vertices] = points - self.rest
         return out
 
     def _gap(self, points: Doubles, turn: Doubles | None) -> float:
         return float(self._seen(points, turn).max(initial=0.0))
 
     def _seen(self, points: Doubles, turn: Doubles | None) -> Doubles:
-        """float64[columns]: how much of the eye is seen, in the target's unit."""
-        posed = self.rest.copy()
-        posed[self.vertices] = points
-        lids = Surface(posed, self._lids.triangles)
-        return visible_gap(lids, self.ball, self.opening, self._through, turn)
+        """float64[columns]: how much of the eye is seen between the edges, in the target's unit."""
+        low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
+        beside = _BESIDE * self.mm / self.ball.radius
+        edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
+        return visible_gap(self._posed(points), self.ball, self.opening, self._through, edges, turn)
 
     def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
         """float64[columns]: what edges are to come together by, radians; below 0 where the upper
@@ -195,7 +204,9 @@ class Eyelids:
         unit = self.mm / self.ball.radius
         apart = high - low
         seen = self._seen(points, turn)
-        apart = np.fmax(apart, np.where(seen > 0, seen / self.ball.radius, np.nan))
+        seen = np.where(seen > 0, seen / self.ball.radius, np.nan)
+        # What is hidden in the eye overlaps a little where it is seen; a hole does more.
+        apart = np.fmax(apart, np.fmin(seen, apart + _THROUGH * unit))
         known = ~np.isnan(apart)
         if not known.any():
             return np.zeros(len(apart))
@@ -258,10 +269,8 @@ class Eyelids:
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
         """float64[n]: how far the eye comes through the skin that is clear of it at rest, or lies
         less than `above` below it, at the corners of the triangles that it comes through."""
-        posed = self.rest.copy()
-        posed[self.vertices] = points
         frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
-        tree = ClosestPoints(posed, np.ascontiguousarray(self._lids.triangles, np.int32))
+        tree = self._posed(points)
         rays = self._looks
         begin = FAR * ball.radius
         triangle, _, distance = tree.first_hit(frame.middle + begin * rays, -rays)
@@ -281,7 +290,7 @@ class Eyelids:
         length = np.linalg.norm(arm, axis=1)
         ray = arm / np.maximum(length, 1e-12)[:, None]
         # The rim keeps the height that it has at rest.
-        moved = np.linalg.norm(points - self.rest[self.vertices], axis=1) > _MOVED * self.mm
+        moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
         rim = (self._from_edge < _BAND) & (moved | (turn is not None))
         need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)
                           - length, 0.0)  # fmt: skip

@@ -7,16 +7,19 @@ any topology, without names and without a template.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..._native import ClosestPoints
-from ...author.geometry.skeleton import Doubles
+from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 from .eyeballs import Eyeball
 
+Mask = npt.NDArray[np.bool_]
 FAR = 1.9  # of the radius: what is further from the eye's middle is no lid
 COLUMNS = 48
 _WIDE, _HIGH = 72.0, 60.0  # degrees from the front in which the opening is sought
@@ -24,7 +27,9 @@ _STEP = 2.0  # degrees of the first look
 _FINE = 0.5  # degrees of the second look, whose edges are then halved
 _HALVINGS = 6
 _ABOVE = 1.001  # of the eye's surface: where rays begin
-_LEAST = 8  # directions of the first look that an opening has at least
+_LEAST = 6  # directions of the first look that an opening has at least
+_SURE = 12  # directions that it has where ways out of it were cut but once
+_CUTS = 4
 
 
 @dataclass(frozen=True)
@@ -97,8 +102,8 @@ def near_eye(surface: Surface, ball: Eyeball) -> Surface:
         surface: of the skin.
         ball: the eye.
     """
-    away = np.linalg.norm(surface.points - ball.middle, axis=1) < FAR * ball.radius
-    return Surface(surface.points, surface.triangles[away[surface.triangles].any(axis=1)])
+    near = np.linalg.norm(surface.points - ball.middle, axis=1) < FAR * ball.radius
+    return Surface(surface.points, surface.triangles[near[surface.triangles].any(axis=1)])
 
 
 def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:
@@ -110,25 +115,26 @@ def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:
     """
     if not len(lids.triangles):
         return None
-    tree = ClosestPoints(lids.points, np.ascontiguousarray(lids.triangles, np.int32))
+    used, triangles = np.unique(lids.triangles, return_inverse=True)
+    tree = ClosestPoints(lids.points[used], triangles.reshape(-1, 3).astype(np.int32))
     x, y, z = np.eye(3)
     frame = Frame(ball.middle, x, y, z)
     across = np.radians(np.arange(-_WIDE, _WIDE + 1e-9, _STEP))
     up = np.radians(np.arange(-_HIGH, _HIGH + 1e-9, _STEP))
-    ends = np.zeros(2)
-    for _ in range(2):  # the second time about the axis through both corners
+    blob = None
+    for _ in range(3):  # at last about the axis through both corners
+        frame = frame if blob is None else _turned(frame, across, up, blob)
         seen = _seen(tree, ball, frame.rays(*np.meshgrid(across, up, indexing="ij")))
-        blob = _largest(seen)
+        blob = _between_lids(seen)
         if blob is None:
             return None
-        ends = across[np.flatnonzero(blob.any(axis=1))[[0, -1]]]
-        frame = _turned(frame, across, up, blob)
-    return _refined(tree, ball, frame, ends)
+    assert blob is not None
+    columns = np.flatnonzero(blob.any(axis=1))
+    bounds = [(up[blob[c]].min(), up[blob[c]].max()) for c in columns]
+    return _refined(tree, ball, frame, across[columns], np.array(bounds))
 
 
-def _seen(
-    tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | None = None
-) -> npt.NDArray[np.bool_]:
+def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | None = None) -> Mask:
     """bool[...]: whether a ray from the middle leaves between the lids."""
     flat = rays if rays.ndim == 2 else rays.reshape(-1, 3)
     # From the eye's surface: a socket behind it, and the part of a rim within it, hide nothing.
@@ -137,30 +143,46 @@ def _seen(
     return np.asarray(triangle).reshape(rays.shape[:-1]) < 0
 
 
-def _largest(seen: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_] | None:
-    """The largest region of directions that does not reach the border of the look, else the
-    largest."""
-    from_place = np.where(seen, np.arange(1, seen.size + 1).reshape(seen.shape), 0)
+def _between_lids(seen: Mask) -> Mask | None:
+    """The largest region of directions that does not reach the border of the look: what does lies
+    beside the lids. Ways that leak out of it, through holes of a scan, are cut first."""
+    core = seen
+    for cuts in range(_CUTS):
+        core = core & _beside(core, np.minimum.reduce)
+        place = _regions(core)
+        labels, counts = np.unique(place[core], return_counts=True)
+        border = np.concatenate([place[[0, -1]].ravel(), place[:, [0, -1]].ravel()])
+        counts = np.where(np.isin(labels, border), 0, counts)
+        if not len(labels):
+            return None
+        if counts.max() >= (_LEAST if cuts else _SURE):
+            blob: Mask = place == labels[counts.argmax()]
+            for _ in range(cuts + 1):
+                blob = seen & _beside(blob, np.maximum.reduce)
+            return blob
+    return None
+
+
+def _regions(core: Mask) -> Ints:
+    """int64 as `core`: a number for each region that hangs together, 0 outside."""
+    place = np.where(core, np.arange(1, core.size + 1).reshape(core.shape), 0)
     while True:
-        padded = np.pad(from_place, 1)
-        beside = np.maximum.reduce(
-            [padded[1:-1, 1:-1], padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:],
-             padded[1:-1, :-2]]
-        )  # fmt: skip
-        beside = np.where(seen, beside, 0)
-        if (beside == from_place).all():
-            break
-        from_place = beside
-    labels, counts = np.unique(from_place[seen], return_counts=True)
-    if not len(labels) or counts.max() < _LEAST:
-        return None
-    border = set(from_place[[0, -1]].ravel()) | set(from_place[:, [0, -1]].ravel())
-    inner = np.array([label not in border for label in labels]) & (counts >= _LEAST)
-    counts = np.where(inner, counts, 0) if inner.any() else counts
-    return np.asarray(from_place == labels[counts.argmax()])
+        spread = np.where(core, _beside(place, np.maximum.reduce), 0)
+        if (spread == place).all():
+            return np.asarray(place, np.int64)
+        place = spread
 
 
-def _turned(frame: Frame, across: Doubles, up: Doubles, blob: npt.NDArray[np.bool_]) -> Frame:
+def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any]:
+    """Of each place and the four beside it the least or the most."""
+    padded = np.pad(values, 1, mode="edge")
+    return np.asarray(
+        of([padded[1:-1, 1:-1], padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:],
+            padded[1:-1, :-2]])
+    )  # fmt: skip
+
+
+def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
     """A frame whose first axis goes through the corners, whose front is the opening's middle."""
     columns = np.flatnonzero(blob.any(axis=1))
     heights = np.array([up[blob[c]].mean() for c in columns])
@@ -173,22 +195,29 @@ def _turned(frame: Frame, across: Doubles, up: Doubles, blob: npt.NDArray[np.boo
     return Frame(frame.middle, axis, np.cross(front, axis), front)
 
 
-def _refined(tree: ClosestPoints, ball: Eyeball, frame: Frame, ends: Doubles) -> Opening | None:
-    """Edges by column, each halved until it is known to a hundredth of a degree."""
-    inset = np.radians(_STEP) / 2
-    across = np.linspace(ends[0] - inset, ends[1] + inset, COLUMNS + 2)[1:-1]
+def _refined(
+    tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
+) -> Opening | None:
+    """Edges by column, each halved until it is known to a hundredth of a degree.
+
+    columns and bounds: of the first look, the lowest and the highest direction of each.
+    """
+    step = np.radians(_STEP)
+    ends = columns[[0, -1]] + [-step / 2, step / 2]
+    across = np.linspace(ends[0], ends[1], COLUMNS + 2)[1:-1]
+    low, high = (np.interp(across, columns, bounds[:, k]) for k in (0, 1))
     up = np.radians(np.arange(-_HIGH, _HIGH + 1e-9, _FINE))
     seen = _seen(tree, ball, frame.rays(*np.meshgrid(across, up, indexing="ij")))
-    blob = _largest(seen)
-    if blob is None:
+    seen &= (up > low[:, None] - 1.5 * step) & (up < high[:, None] + 1.5 * step)
+    kept = seen.any(axis=1)
+    if not kept.any():
         return None
-    kept = blob.any(axis=1)
-    across, blob = across[kept], blob[kept]
-    first = blob.argmax(axis=1)
-    last = blob.shape[1] - 1 - blob[:, ::-1].argmax(axis=1)
-    step = np.radians(_FINE)
+    across, seen = across[kept], seen[kept]
+    first = seen.argmax(axis=1)
+    last = seen.shape[1] - 1 - seen[:, ::-1].argmax(axis=1)
+    fine = np.radians(_FINE)
     edges = []
-    for open_at, way in ((up[first], -step), (up[last], step)):
+    for open_at, way in ((up[first], -fine), (up[last], fine)):
         inside, outside = open_at, open_at + way
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
@@ -212,7 +241,12 @@ def gap_rays(opening: Opening) -> Doubles:
 
 
 def visible_gap(
-    lids: Surface, ball: Eyeball, opening: Opening, rays: Doubles, turn: Doubles | None = None
+    lids: ClosestPoints,
+    ball: Eyeball,
+    opening: Opening,
+    rays: Doubles,
+    edges: tuple[Doubles, Doubles],
+    turn: Doubles | None = None,
 ) -> Doubles:
     """float64[columns]: how much of the eye is seen in each column, in the surface's unit.
 
@@ -221,13 +255,14 @@ def visible_gap(
         ball: the eye.
         opening: at rest, of the same skin.
         rays: what gap_rays gives of it.
+        edges: float64[columns] each, radians: between which the lids' edges lie in this pose; NaN
+            where it is not known. What is seen beyond them is a hole of the skin.
         turn: float64[3, 3], what the eye is turned by; None: it rests.
     """
-    tree = ClosestPoints(lids.points, np.ascontiguousarray(lids.triangles, np.int32))
     up = _grid(opening)[1]
-    seen = _seen(tree, ball, rays, turn).reshape(up.shape)
-    # Beyond the edges at rest nothing was seen; what is seen there is beside the lids.
-    low, high = (e[:, None] + s * _MARGIN for e, s in ((opening.low, -1), (opening.high, 1)))
+    seen = _seen(lids, ball, rays, turn).reshape(up.shape)
+    low = np.fmax(edges[0], opening.low - _MARGIN)[:, None]
+    high = np.fmin(edges[1], opening.high + _MARGIN)[:, None]
     seen &= (up > low) & (up < high)
     step = (up[0, 1] - up[0, 0]) * ball.radius
     return np.asarray(seen.sum(axis=1) * step * np.cos(opening.across))

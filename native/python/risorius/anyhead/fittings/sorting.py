@@ -12,6 +12,7 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ...author.heads.islands import islands_of
 from ...author.heads.parts import HeadPart, first_vertices, taken_apart
 from ...author.heads.turning import Eye, take_eyes
+from ...author.input.obj import ObjMesh
 from ...base.errors import ArgumentError
 from ...base.words import counted
 from ..eyes.eyeballs import Eyeball
@@ -71,8 +72,15 @@ def sort_parts(parts: Sequence[HeadPart]) -> Fittings:
     for eye in eyes:
         out.eyes[eye.side] = eyeball_of(eye)
         out.rows.extend(Fitted(EYE, part, eye.side) for part in eye.parts)
-    others = [piece for piece in islands if piece is not face]
     place = _Place(face, eyes)
+    others = [piece for piece in islands if piece is not face]
+    own = [piece for piece in others if piece.source == face.source and _is_skin(piece, place)]
+    if own:  # crumbs of a scan, ears: the mesh stays one
+        others = [piece for piece in others if all(piece is not crumb for crumb in own)]
+        face = out.face = _in_one([face, *own], face.name)
+    whole = [part for part in rest if part.source == face.source]
+    if len(whole) == 1 and len(whole[0].mesh.faces) == len(face.mesh.faces):
+        out.face = whole[0]  # nothing was taken out of it: its vertices keep their numbers
     for piece in _gathered(others, place):
         out.rows.append(piece)
     _divide_mouth(out, place)
@@ -199,6 +207,10 @@ def _gathered(pieces: Sequence[HeadPart], place: _Place) -> list[Fitted]:
     return [Fitted(kind, _joined(own, kind)) for (kind, _), own in groups.items()]
 
 
+def _is_skin(piece: HeadPart, place: _Place) -> bool:
+    return _named(piece.name) is None and _by_place(piece, place) in (SKIN, OTHER)
+
+
 def _by_place(piece: HeadPart, place: _Place) -> str:
     points = piece.mesh.positions
     if place.at_eye(points):
@@ -229,18 +241,33 @@ def _joined(pieces: Sequence[HeadPart], kind: str) -> HeadPart:
     if len(pieces) == 1:
         first.name = name
         return first
-    mesh = type(first.mesh)(np.zeros((0, 3)), first.mesh.uvs)
-    start, points, numbers = 0, [], []
-    for piece in pieces:
-        points.append(piece.mesh.positions)
-        mesh.faces.extend([v + start for v in face] for face in piece.mesh.faces)
-        mesh.uv_faces.extend(piece.mesh.uv_faces)
-        numbers.append(
+    return _in_one(pieces, name)
+
+
+def _in_one(pieces: Sequence[HeadPart], name: str) -> HeadPart:
+    """Parts of one object as one mesh, their polygons in the object's order."""
+    first = pieces[0]
+    numbers = np.concatenate(
+        [
             piece.polygons if piece.polygons is not None else np.arange(len(piece.mesh.faces))
-        )
+            for piece in pieces
+        ]
+    )
+    faces: list[list[int]] = []
+    uv_faces: list[list[int]] = []
+    start = 0
+    for piece in pieces:
+        faces.extend([v + start for v in face] for face in piece.mesh.faces)
+        uv_faces.extend(piece.mesh.uv_faces)
         start += len(piece.mesh.positions)
-    mesh.positions = np.concatenate(points)
-    return HeadPart(name, mesh, {}, first.material, first.source, np.concatenate(numbers))
+    order = np.argsort(numbers, kind="stable")
+    mesh = ObjMesh(
+        np.concatenate([piece.mesh.positions for piece in pieces]),
+        first.mesh.uvs,
+        [faces[k] for k in order],
+        [uv_faces[k] for k in order],
+    )
+    return HeadPart(name, mesh, {}, first.material, first.source, numbers[order])
 
 
 def _called(piece: HeadPart, kind: str) -> str:

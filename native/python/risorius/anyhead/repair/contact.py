@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,9 +19,14 @@ _NEAR = 0.8  # cm from teeth: skin that may come into them
 _DEEP = 0.01  # cm: what is less deep is left alone
 _INSIDE = 0.4  # cm: what seems to be deeper in lies behind
 _STRETCH = 2.5  # times its area, as SkinChecker counts it
-_LEAST = 0.5  # mm3 that are left alone
+LEAST = 0.5  # mm3 that are left alone
 _AWAY = 1e4  # cm: solids that are there touch nothing
 _ROUNDS = 4
+_MOVED = 1e-4  # cm: what moves less rests
+_AROUND = 15.0  # cm: what is further hides nothing
+_RIM = 2  # rings of vertices beside what is seen
+_MANY = 60_000  # vertices of a skin from which on the soft way is not tried
+Mask = npt.NDArray[np.bool_]
 
 
 class Contacts:
@@ -40,11 +46,16 @@ class Contacts:
         self._corners = np.concatenate([np.asarray(face, np.int64) for face in faces])
         of_triangle = np.repeat(np.arange(len(faces)), np.maximum(sizes - 2, 0))
         self._face_of = of_triangle if len(of_triangle) == len(skin.triangles) else None
-        self._area = self._areas(skin.points)
+        self._area = self._areas(skin.points, np.arange(len(skin.triangles)))
         self._checker: SkinChecker | None = None
         self._rest: SkinFaults | None = None
         self._near = self._near_teeth()
         self._rest_depth = self._depth(skin.points[self._near], bodies.rest)
+        area = np.zeros(len(skin.points))
+        of_triangle = np.linalg.norm(skin.face_normals(), axis=1) / 6
+        for k in range(3):
+            area += np.bincount(skin.triangles[:, k], of_triangle, len(area))
+        self._share = area[self._near]  # cm2 of each vertex
 
     def stretched(self, displacement: Doubles) -> int:
         """How many polygons have more than 2.5 times their area.
@@ -52,35 +63,31 @@ class Contacts:
         Args:
             displacement: float64[V, 3].
         """
-        areas = self._areas(self.skin.points + displacement)
+        moved = np.abs(displacement).max(axis=1) > _MOVED
+        own = np.flatnonzero(moved[self.skin.triangles].any(axis=1))
+        if self._face_of is not None:  # all of a polygon
+            polygons = np.zeros(len(self._area), bool)
+            polygons[self._face_of[own]] = True
+            own = np.flatnonzero(polygons[self._face_of])
+        areas = self._areas(self.skin.points + displacement, own)
         return int((areas > _STRETCH * np.maximum(self._area, 1e-12)).sum())
 
-    def suspicious(self, displacement: Doubles, controls: tuple[str, ...]) -> bool:
-        """Whether skin seems to be in teeth or gums, deeper than at rest; far cheaper than volume.
+    def volume(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
+        """mm3 of skin in teeth and gums, beyond rest: depth times area, as SkinChecker counts it.
 
         Args:
             displacement: float64[V, 3].
             controls: raw controls that are 1.
         """
         if not len(self._near):
-            return False
+            return 0.0
         own = displacement[self._near]
         posed = self.bodies.posed(controls)
         if posed is self.bodies.rest and np.abs(own).max(initial=0.0) < _DEEP:
-            return False
+            return 0.0
         depth = self._depth(self.skin.points[self._near] + own, posed)
-        return bool((depth > self._rest_depth + _DEEP).any())
-
-    def volume(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
-        """mm3 of skin in teeth and gums, beyond rest.
-
-        Args:
-            displacement: float64[V, 3].
-            controls: raw controls that are 1.
-        """
-        points, posed = self.skin.points + displacement, self.bodies.posed(controls)
-        faults = self._made().look(points, posed)
-        return float(self._made().sum(faults, self._allowed(points)).volume)
+        beyond = np.maximum(depth - self._rest_depth - _DEEP, 0.0)
+        return float(beyond @ self._share) * MM**3
 
     def pushed(self, displacement: Doubles, controls: tuple[str, ...]) -> Doubles:
         """float64[V, 3]: an expression with less skin in teeth and gums, pushed out softly.
@@ -89,11 +96,13 @@ class Contacts:
             displacement: float64[V, 3].
             controls: raw controls that are 1.
         """
-        out, posed = displacement, self.bodies.posed(controls)
-        points = self.skin.points + out
+        posed = self.bodies.posed(controls)
+        if len(self.skin.points) > _MANY:
+            return self._lifted(displacement, posed)
+        points = self.skin.points + displacement
         moved, _, after = self._made().repair(points, posed, self._allowed(points), [])
-        out = out + np.asarray(moved)
-        return self._lifted(out, posed) if after.volume > _LEAST else out
+        out = displacement + np.asarray(moved)
+        return self._lifted(out, posed) if after.volume > LEAST else out
 
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
         """Out along the teeth's normals, with what is around, where the soft way found nothing."""
@@ -136,19 +145,46 @@ class Contacts:
         depth = np.maximum(np.asarray(self._rest.depth), np.asarray(itself.depth))
         return SkinFaults(depth, itself.stretch, itself.fold)
 
-    def _areas(self, points: Doubles) -> Doubles:
-        """float64[polygons], twice the area of each as a fan."""
-        area = np.linalg.norm(Surface(points, self.skin.triangles).face_normals(), axis=1)
-        return area if self._face_of is None else np.asarray(np.bincount(self._face_of, area))
+    def _areas(self, points: Doubles, own: Ints) -> Doubles:
+        """float64[polygons], twice the area of each as a fan; of those of some triangles alone."""
+        a, b, c = (points[self.skin.triangles[own, k]] for k in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        if self._face_of is None:
+            out = np.zeros(len(self.skin.triangles))
+            out[own] = area
+            return out
+        count = int(self._face_of.max(initial=-1)) + 1
+        return np.asarray(np.bincount(self._face_of[own], area, minlength=count))
 
     def _near_teeth(self) -> Ints:
+        """int64[n]: vertices near teeth and gums that are seen when the mouth opens: who looks in
+        from the front sees no inside of a cheek."""
         if not self.bodies.rest:
             return np.zeros(0, np.int64)
         points = np.concatenate(self.bodies.rest)
         low, high = points.min(axis=0) - _NEAR, points.max(axis=0) + _NEAR
         inside = ((self.skin.points > low) & (self.skin.points < high)).all(axis=1)
-        inside &= np.asarray(self._made().shown)  # nobody sees the cheeks' inside
-        return np.flatnonzero(inside)
+        near = np.flatnonzero(inside)
+        return near[self._seen(near)] if len(near) else near
+
+    def _seen(self, vertices: Ints) -> Mask:
+        """bool[n]: whether a vertex is seen from somewhere in front of the face, or is beside one
+        that is."""
+        points, normals = self.skin.points, self.skin.normals()[vertices]
+        triangles = np.ascontiguousarray(self.skin.triangles, np.int32)
+        tree = ClosestPoints(points, triangles)
+        seen = np.zeros(len(points), bool)
+        for x, y in itertools.product((-1.0, -0.4, 0.0, 0.4, 1.0), (-0.7, 0.0, 0.7)):
+            way = np.array([x, y, 1.0]) / np.linalg.norm([x, y, 1.0])
+            faces = normals @ way > 0.05
+            begin = points[vertices[faces]] + 0.01 * normals[faces]
+            hit, _, _ = tree.first_hit(begin, np.broadcast_to(way, begin.shape), farthest=_AROUND)
+            seen[vertices[faces]] |= hit < 0
+        edges = self.skin.edges()
+        for _ in range(_RIM):
+            beside = edges[seen[edges].any(axis=1)]
+            seen[beside] = True
+        return np.asarray(seen[vertices])
 
     def _depth(self, points: Doubles, posed: list[Doubles]) -> Doubles:
         return self._depths(points, posed)[0]

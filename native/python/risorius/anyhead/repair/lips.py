@@ -26,11 +26,11 @@ _WIDTH_MM = 50.0  # of a human mouth: lengths below are meant on it
 _RIM = 1.2  # mm beyond the nearest place of a column: the rim
 _FADE = 14.0  # mm from the rim along the skin: what goes none of the way
 _BAND = 2.5  # mm from the rim: what goes all of it
-_CORNER = 0.06  # of the width: a column so near to a corner may be joined skin
+_CORNER = 0.08  # of the width: a column so near to a corner may be joined skin
 _TOUCH = 0.8  # mm: lips that are nearer touch at rest
 _GOAL = 0.05  # mm between lips that are brought together
-_DEEP = 0.15  # mm that lips may press into each other, where they do no more at rest
-_ROUNDS = 6
+_DEEP = 0.1  # mm that lips may press into each other, where they do no more at rest
+_ROUNDS = 12
 _NEAR = 3.0  # mm: further in there is no sign
 
 
@@ -138,6 +138,16 @@ class Lips:
         known = np.isfinite(gap)
         return Meeting(np.where(known, gap, np.nan), way)
 
+    def welded(self) -> int:
+        """In how many of the COLUMNS one polygon belongs to both lips."""
+        lips = np.zeros(len(self.skin.points), np.int64)
+        lips[np.unique(self._upper)] |= 1
+        lips[np.unique(self._lower)] |= 2
+        corners = lips[self.skin.triangles]
+        both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
+        middles = self.skin.points[self.skin.triangles[both]].mean(axis=1)
+        return len(np.unique(self._column(middles))) - 1 if len(middles) else 0
+
     def widest(self, points: Doubles) -> float:
         """The widest gap between the lips, in the target's unit.
 
@@ -198,11 +208,12 @@ class Lips:
 
     def _apart(self, points: Doubles, samples: Doubles, other: Ints) -> tuple[Doubles, Doubles]:
         """How far samples are from the other lip, below 0: in it; and the ways from it to them."""
-        tree = ClosestPoints(points, np.ascontiguousarray(other, np.int32))
+        used, local = np.unique(other, return_inverse=True)
+        surface = Surface(points[used], local.reshape(-1, 3))
+        tree = ClosestPoints(surface.points, np.ascontiguousarray(surface.triangles, np.int32))
         triangle, shares, distance = tree.nearest(samples)
-        surface = Surface(points, other)
         nearest = surface.at(triangle.astype(np.int64), shares)
-        normals = surface.normals()[other[triangle]]
+        normals = surface.normals()[surface.triangles[triangle]]
         normal = np.einsum("nk,nkd->nd", shares, normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         arm = samples - nearest

@@ -14,14 +14,15 @@ from ..errors import Stopped
 from ..eyes.eyelids import Eyelids, find_eyelids
 from ..fittings.fitted import Bodies, Fittings, eye_turn_of
 from ..surface import Surface
-from .contact import Contacts
-from .lips import Lips
+from .contact import LEAST, Contacts
+from .lips import COLUMNS, Lips
 from .report import MM, Faults, Report
 
 Pose = tuple[str, ...]
 Progress = Callable[[float], bool | None]
 _BLINK, _OPEN = "eyeBlink", "jawOpen"
 _CLOSE = ("mouthLipsTogether", "mouthClose")  # what closes the mouth of an open jaw
+_WELDED = 2  # columns of the mouth: near its corners lips are one
 _CUT = 0.002  # cm of lids in the eye that are left alone
 
 
@@ -145,6 +146,10 @@ class _Repair:
         self.lip_controls = closing
         if not self.lips.found and self.lip_controls:
             self.report.notes.append("no lips that part were found: they stay as they are")
+        welded = self.lips.welded() if self.lips.found else 0
+        if welded > _WELDED:
+            self.report.notes.append(f"the lips are one skin in {welded / COLUMNS:.0%} of the "
+                                     "mouth: they do not part there")  # fmt: skip
         self.bodies = Bodies(parts, target, expressions)
         self.contacts = Contacts(target, faces, self.bodies)
 
@@ -152,24 +157,23 @@ class _Repair:
         """float64[V, 3] of a pose; its faults go into the report."""
         if not way.any():
             return way
-        doubt = self.contacts.suspicious(way, pose)
-        before = self.faults(pose, way, looks=doubt)
+        before = self.faults(pose, way)
         out = self._at_eyes(pose, way)
         if self._closes_mouth(pose):
             out = self.lips.closed(self.target.points + out) - self.target.points
-        if doubt and before.volume > 0:
+        if before.volume > LEAST:
             pushed = self.contacts.pushed(out, pose)
             if self._closes_mouth(pose):
                 pushed = self.lips.closed(self.target.points + pushed) - self.target.points
             out = pushed
         changed = out is not way and bool(np.abs(out - way).max(initial=0.0) > 0)
-        after = self.faults(pose, out, looks=doubt) if changed else before
+        after = self.faults(pose, out) if changed else before
         if before != Faults() or after != Faults() or self._closes(pose):
             self.report.rows["+".join(pose)] = before, after
         return out
 
-    def faults(self, pose: Pose, way: Doubles, *, looks: bool) -> Faults:
-        """What is wrong with a pose; looks: whether skin may be in teeth."""
+    def faults(self, pose: Pose, way: Doubles) -> Faults:
+        """What is wrong with a pose."""
         gap = cut = 0.0
         for side, lids in self.eyelids.items():
             turn = eye_turn_of(side, pose)
@@ -182,7 +186,7 @@ class _Repair:
         if self._closes_mouth(pose):
             points = self.target.points + way
             lip_gap, lip_cut = self.lips.widest(points), self.lips.deepest(points)
-        volume = self.contacts.volume(way, pose) if looks else 0.0
+        volume = self.contacts.volume(way, pose)
         stretched = self.contacts.stretched(way)
         return Faults(gap * MM, cut * MM, lip_gap * MM, lip_cut * MM, volume, stretched)
 
