@@ -69,7 +69,7 @@ class Onto:
         shapes: the head, standing; its expressions are called as the template's controls, and
             those of correctives by theirs with a + between.
         landmarks: in the space that the meshes had.
-        notes: what was guessed and done, a sentence each.
+        notes: what was guessed and done, a sentence each; those of shape_face come beside.
     """
 
     shapes: ShapeSet
@@ -125,14 +125,11 @@ def onto(
     mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
     every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
     every[0].shapes |= {"+".join(p): way for p, way in mended.items() if len(p) > 1}
-    joined = join(
-        where, every, "cm", Wishes(every[0].source, "", "+x", "+y", "+z", "cm", 1.0),
-        {name: [name] for name in source.controls},
-    )  # fmt: skip
+    names = {name: [name] for name in source.controls}
+    joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
-    # The first sentence of the joined head is of its direction, which is told already.
-    return Onto(shapes, head.own, [*notes, *head.notes, *fitted.notes, *joined.notes[1:]])
+    return Onto(shapes, head.own, [*notes, *head.notes, *fitted.notes, *joined.notes])
 
 
 def _mended(
@@ -185,7 +182,7 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
         dna = add_correctives(dna, 0, own)
     _copy_board(template, dna)
-    return Read(dna, Assignment({}, {}, {}, []), made.notes + odd, materials, shapes.kept)
+    return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
 
 
 def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
