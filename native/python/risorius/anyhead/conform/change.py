@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: MIT
+"""How the form of a skin changes from one head to another, at each vertex and beside it.
+
+The local change of form (Sumner and Popovic, "Deformation Transfer for Triangle Meshes", 2004, as
+a matrix at each vertex) is evened out over some centimetres: it says how long a lid or a lip is on
+the other head, not how each wrinkle of it lies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ... import Mesh, _native
+from ...author.geometry import skeleton as sk
+from ...author.geometry.rigid import rigid_fit
+from ...author.geometry.simplify import fan_triangles
+from ...author.geometry.skeleton import Doubles, Ints
+from ..surface import Surface
+
+_EVENED = 0.24  # of the skin's spread, which is 8.4 cm of a head of 24: 2 cm
+_CELL = 0.4  # of that: vertices so close are one to the others
+_STEADY = 1e-6
+_AT_ONCE = 1024
+_TURNED = 0.5  # what a turn leaves of the difference at most, where the head is turned
+
+
+@dataclass(frozen=True)
+class Similar:
+    """A scaled turn about a point, and where the point comes to: float64[3, 3], float64[3]."""
+
+    linear: Doubles
+    middle: Doubles
+    becomes: Doubles
+
+    def __call__(self, points: Doubles) -> Doubles:
+        """float64[n, 3] of float64[n, 3]."""
+        return self.becomes + (points - self.middle) @ self.linear.T
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Points that a skin holds: the triangle nearest to each, and the place on it.
+
+    Attributes:
+        triangle: int64[n].
+        shares: float64[n, 3], barycentric.
+        away: float64[n, 3], from that place to the point.
+    """
+
+    triangle: Ints
+    shares: Doubles
+    away: Doubles
+
+
+def surface_of(mesh: Mesh, points: Doubles) -> Surface:
+    """The mesh with its vertices at other places.
+
+    Args:
+        mesh: has the polygons.
+        points: float64[V, 3].
+    """
+    places = np.asarray(mesh.layout_positions, np.int64)
+    return Surface(points, places[fan_triangles(mesh)])
+
+
+class Change:
+    """From a skin to the same skin on another head.
+
+    Attributes:
+        before, after: the skin of either head.
+        turn: float64[3, 3], the rotation that the second head is turned by.
+        linear: float64[V, 3, 3], the evened change of form at each vertex.
+    """
+
+    def __init__(self, mesh: Mesh, before: Doubles, after: Doubles) -> None:
+        """Compares two heads.
+
+        Args:
+            mesh: has the polygons.
+            before: float64[V, 3], on the one.
+            after: float64[V, 3], on the other one.
+        """
+        self.before, self.after = surface_of(mesh, before), surface_of(mesh, after)
+        self.turn, self.size = turn_of(before, after)
+        spread = float(np.sqrt(((before - before.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        self.reach = _EVENED * max(spread, 1e-12)
+        self.linear = self._evened(sk.mesh_edges(mesh).astype(np.int64))
+
+    def _evened(self, edges: Ints) -> Doubles:
+        count = len(self.before.points)
+        whole = np.tile(self.size * self.turn, (count, 1, 1))
+        if not len(edges):
+            return whole
+        ends = np.concatenate([edges, edges[:, ::-1]])
+        start = ends[:, 0]
+        a, b = (s.points[ends[:, 1]] - s.points[start] for s in (self.before, self.after))
+        mixed = _sums(start, np.einsum("ni,nj->nij", b, a), count)
+        own = _sums(start, np.einsum("ni,nj->nij", a, a), count)
+        square = np.einsum("vii->v", own)
+        grown = _sums(start, np.einsum("ni,ni->n", b, b)[:, None, None], count)[:, 0, 0]
+        grown = np.sqrt(grown / np.maximum(square, 1e-300))
+        flat, bent = self.before.normals(), self.after.normals()
+        mixed += (square * grown / 2)[:, None, None] * bent[:, :, None] * flat[:, None, :]
+        own += (square / 2)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+        both = self._spread(np.concatenate([mixed.reshape(-1, 9), own.reshape(-1, 9)], axis=1))
+        mixed, own = both[:, :9].reshape(-1, 3, 3), both[:, 9:].reshape(-1, 3, 3)
+        steady = np.einsum("vii->v", own)[:, None, None] * _STEADY
+        mixed, own = mixed + steady * whole, own + steady * np.eye(3)
+        able = steady[:, 0, 0] > 0
+        out = whole
+        right = np.swapaxes(mixed[able], 1, 2)
+        out[able] = np.swapaxes(np.linalg.solve(own[able], right), 1, 2)
+        return out
+
+    def _spread(self, rows: Doubles) -> Doubles:
+        """Sums over the vertices around each, which count less the farther off they are."""
+        points = self.before.points
+        at = np.floor((points - points.min(axis=0)) / (_CELL * self.reach)).astype(np.int64)
+        at = np.ravel_multi_index(tuple(at.T), tuple(at.max(axis=0) + 1))
+        cell = np.unique(at, return_inverse=True)[1].ravel()
+        counts = np.bincount(cell)
+        sums = _sums(cell, np.concatenate([rows, points], axis=1)[:, :, None], len(counts))[..., 0]
+        middles = sums[:, -3:] / counts[:, None]
+        out = np.empty_like(rows)
+        for begin in range(0, len(points), _AT_ONCE):
+            own = points[begin : begin + _AT_ONCE]
+            out[begin : begin + _AT_ONCE] = self._near(own, middles) @ sums[:, :-3]
+        return out
+
+    def _near(self, points: Doubles, others: Doubles) -> Doubles:
+        """float64[n, m]: how much each of the others counts at each point."""
+        square = (points**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * points @ others.T
+        return np.exp(-np.maximum(square, 0.0) / (2 * self.reach**2))
+
+    @cached_property
+    def _closest(self) -> _native.ClosestPoints:
+        return _native.ClosestPoints(self.before.points, self.before.triangles.astype(np.int32))
+
+    def hold(self, points: Doubles, normals: Doubles | None = None) -> Hold:
+        """Where the skin of the first head holds points that lie near it.
+
+        Args:
+            points: float64[n, 3].
+            normals: float64[n, 3] of the points; None: any side of the skin may hold them.
+        """
+        found, places, _ = self._closest.nearest(points)
+        triangle, shares = found.astype(np.int64), np.asarray(places)
+        if normals is not None:
+            found, places, _ = self._closest.nearest(points, normals, 0.0, self.reach)
+            facing = found >= 0
+            triangle[facing], shares[facing] = found[facing], places[facing]
+        return Hold(triangle, shares, points - self.before.at(triangle, shares))
+
+    def at(self, hold: Hold) -> Doubles:
+        """float64[n, 3, 3]: the change of form where points are held."""
+        corners = self.before.triangles[hold.triangle]
+        return np.einsum("nk,nkij->nij", hold.shares, self.linear[corners])
+
+    def carried(self, hold: Hold, linear: Doubles | None = None) -> Doubles:
+        """float64[n, 3]: where the skin of the second head brings the points.
+
+        Args:
+            hold: of the points.
+            linear: float64[n, 3, 3] of them, as `at` gives it.
+        """
+        linear = self.at(hold) if linear is None else linear
+        there = self.after.at(hold.triangle, hold.shares)
+        return there + np.einsum("nij,nj->ni", linear, hold.away)
+
+    def around(self, middle: Doubles, reach: float) -> Similar:
+        """The similarity that fits the skin around a point best.
+
+        Args:
+            middle: float64[3].
+            reach: vertices as far away count for e^-0.5.
+        """
+        square = ((self.before.points - middle) ** 2).sum(axis=1)
+        share = np.exp(-(square - square.min()) / (2 * reach**2))
+        share /= share.sum()
+        a, b = share @ self.before.points, share @ self.after.points
+        linear = np.tensordot(share, self.linear, 1)
+        size = float(np.cbrt(max(np.linalg.det(linear), 1e-30)))
+        return Similar(size * self.turn, middle, b + linear @ (middle - a))
+
+
+def similar(before: Doubles, after: Doubles, change: Change) -> Similar:
+    """The similarity that fits points best, with the turn of the whole head.
+
+    Args:
+        before, after: float64[n, 3].
+        change: of the head.
+    """
+    a, b = before.mean(axis=0), after.mean(axis=0)
+    square = max(float(((before - a) ** 2).sum()), 1e-300)
+    size = float(((after - b) * ((before - a) @ change.turn.T)).sum()) / square
+    return Similar((size if size > 0 else change.size) * change.turn, a, b)
+
+
+def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
+    """The rotation of a head that is turned, float64[3, 3], and how much larger it is.
+
+    Heads of another form fit each other better after some small turn, as a longer chin counts: that
+    is form. A turn is one only where it explains most of the difference.
+
+    Args:
+        before, after: float64[n, 3].
+    """
+    turn, _ = rigid_fit(before, after)
+    a, b = before - before.mean(axis=0), after - after.mean(axis=0)
+    square = max(float((a**2).sum()), 1e-300)
+    left = []
+    for rotation in (np.eye(3), turn):
+        size = max(float((b * (a @ rotation.T)).sum()) / square, 0.0)
+        left.append(float(((b - size * a @ rotation.T) ** 2).sum()))
+    turn = turn if left[1] < _TURNED**2 * left[0] else np.eye(3)
+    size = float((b * (a @ turn.T)).sum()) / square
+    return turn, size if size > 0 else 1.0
+
+
+def _sums(rows: Ints, values: Doubles, count: int) -> Doubles:
+    """float64[count, ...]: the sums of the values of each row."""
+    flat = values.reshape(len(values), -1)
+    out = np.empty((count, flat.shape[1]))
+    for k in range(flat.shape[1]):
+        out[:, k] = np.bincount(rows, weights=flat[:, k], minlength=count)
+    return out.reshape(count, *values.shape[1:])

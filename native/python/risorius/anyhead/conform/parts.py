@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""What of a face is stiff: eyes, which are spheres, and the inside of the mouth."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ... import Dna, Mesh
+from ...author.geometry import skeleton as sk
+from ...author.geometry.simplify import pieces_of
+from ...author.geometry.skeleton import Doubles, Ints
+from ...author.heads.islands import ball_of
+from ...web.kinds import kind_of
+from .change import Change, Similar, similar
+
+_ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
+_MOUTH = re.compile(r"saliva", re.IGNORECASE)
+_INNER = 0.35  # of an eye's radius: joints as near to its middle are the eye's
+_RIM, _BAND = 1.02, 0.12  # of the radius: where lids lie, and how thick their layer is
+_STIFF = 0.9  # of a vertex' weight that an eye's joints have, where it goes with the eye
+_PRIOR = 0.1  # of what the places of the rim count beside their distance from the eye
+_ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class Eye:
+    """An eyeball: middle float64[3] and radius on the first head, and where it comes to."""
+
+    middle: Doubles
+    radius: float
+    way: Similar
+    joints: frozenset[int]
+
+
+def kind(name: str) -> str:
+    """eyes, mouth, or skin for what lies on the skin.
+
+    Args:
+        name: of a mesh.
+    """
+    found = kind_of(name)
+    if found in ("teeth", "tongue", "gum") and not _ON_SKIN.search(name):
+        return "mouth"
+    if found == "wet" and _MOUTH.search(name):
+        return "mouth"
+    return "eyes" if found == "eyes" else "skin"
+
+
+def skin_of(dna: Dna) -> int:
+    """The mesh of the finest level that is the skin; -1: there is none.
+
+    Args:
+        dna: the face.
+    """
+    return max(
+        (m for m in finest(dna) if kind_of(dna.mesh_names[m]) == "skin"),
+        key=lambda m: (len(dna.meshes[m].positions), -m),
+        default=-1,
+    )
+
+
+def finest(dna: Dna) -> list[int]:
+    """The meshes of LOD 0."""
+    rows, count = dna.lod_mesh_mapping, min(len(dna.meshes), len(dna.mesh_names))
+    listed = rows[0].tolist() if len(rows) else range(count)
+    return [m for m in listed if m < count and len(dna.meshes[m].positions)]
+
+
+def mouth_way(dna: Dna, change: Change) -> Similar | None:
+    """What teeth, gums and tongue do together; None: there are none.
+
+    Args:
+        dna: the face.
+        change: of its skin.
+    """
+    own = [
+        np.asarray(dna.meshes[m].positions, np.float64)
+        for m in finest(dna)
+        if kind(dna.mesh_names[m]) == "mouth"
+    ]
+    if not own:
+        return None
+    points = np.concatenate(own)
+    low, high = points.min(axis=0), points.max(axis=0)
+    return change.around((low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+
+
+def eyes_of(dna: Dna, change: Change, moved: Mapping[str, Doubles], world: Doubles) -> list[Eye]:
+    """The eyeballs of a face.
+
+    Args:
+        dna: the face.
+        change: of its skin.
+        moved: float64[V, 3] by mesh, where vertices lie on the other head; an eye that is there
+            goes there.
+        world: float64[J, 3], where the joints are.
+    """
+    out: list[Eye] = []
+    for m in finest(dna):
+        name, mesh = dna.mesh_names[m], dna.meshes[m]
+        if kind(name) != "eyes":
+            continue
+        points = np.asarray(mesh.positions, np.float64)
+        for vertices in _balls(mesh, points):
+            ball = ball_of(points, vertices, off=0.3)
+            middle = points[vertices].mean(axis=0) if ball is None else ball.middle
+            far = np.linalg.norm(points[vertices] - middle, axis=1)
+            radius = float(np.median(far)) if ball is None else ball.radius
+            own = [e for e in out if np.linalg.norm(e.middle - middle) < max(e.radius, radius)]
+            if own:
+                continue  # its cornea, or what lies behind it
+            joints = np.flatnonzero(np.linalg.norm(world - middle, axis=1) < _INNER * radius)
+            if name in moved:
+                way = similar(points[vertices], moved[name][vertices], change)
+            else:
+                way = _in_lids(change, middle, radius)
+            out.append(Eye(middle, radius, way, frozenset(joints.tolist())))
+    return out
+
+
+def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
+    """bool[V]: whether vertices go with an eye, as its joints hold them.
+
+    Args:
+        mesh: has the weights.
+        joints: of the eye.
+    """
+    vertex, joint, weight = sk.skin_entries(mesh)
+    own = weight * np.isin(joint, list(joints))
+    held = np.bincount(vertex, weights=own, minlength=len(mesh.positions))
+    return np.asarray(held > _STIFF)
+
+
+def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
+    """The pieces of a mesh that lie at places of their own, largest first."""
+    label = pieces_of(mesh)
+    pieces = [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
+    return sorted(pieces, key=lambda own: -float(np.ptp(points[own], axis=0).max()))
+
+
+def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
+    """An eyeball whose distance from the lids is as it was.
+
+    The rim of the lids is a band of a sphere: it says well where the eye is from the front and less
+    well how large it is, so what the skin around does counts too.
+    """
+    start = change.around(middle, radius)
+    away = change.before.points - middle
+    far = np.linalg.norm(away, axis=1)
+    share = np.exp(-(((far / radius - _RIM) / _BAND) ** 2) / 2)
+    near = np.flatnonzero(share > 1e-3)
+    if len(near) < 12:
+        return start
+    share, far, after = share[near], far[near], change.after.points[near]
+    turned = away[near] @ change.turn.T
+    place = np.append(start.becomes, np.cbrt(np.linalg.det(start.linear)))
+    for _ in range(_ROUNDS):
+        to = after - place[:3]
+        length = np.maximum(np.linalg.norm(to, axis=1), 1e-12)
+        off = length - place[3] * far
+        rows = np.column_stack([-to / length[:, None], -far])
+        apart = (to - place[3] * turned).reshape(-1)
+        more = np.column_stack([np.tile(-np.eye(3), (len(near), 1)), -turned.reshape(-1)])
+        weight = _PRIOR * np.repeat(share, 3)
+        left = rows.T @ (share[:, None] * rows) + more.T @ (weight[:, None] * more)
+        right = rows.T @ (share * off) + more.T @ (weight * apart)
+        step = np.linalg.solve(left, right)
+        place = place - step
+        if np.abs(step[:3]).max() < 1e-9 * radius:
+            break
+    return Similar(place[3] * change.turn, middle, place[:3])
