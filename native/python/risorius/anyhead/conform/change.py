@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from ... import Mesh, _native
 from ...author.geometry import skeleton as sk
@@ -34,6 +35,11 @@ class Similar:
     linear: Doubles
     middle: Doubles
     becomes: Doubles
+
+    @property
+    def size(self) -> float:
+        """What lengths are multiplied with."""
+        return float(np.cbrt(max(np.linalg.det(self.linear), 0.0)))
 
     def __call__(self, points: Doubles) -> Doubles:
         """float64[n, 3] of float64[n, 3]."""
@@ -153,6 +159,17 @@ class Change:
             facing = found >= 0
             triangle[facing], shares[facing] = found[facing], places[facing]
         return Hold(triangle, shares, points - self.before.at(triangle, shares))
+
+    def sees(self, points: Doubles, ways: Doubles, far: float) -> npt.NDArray[np.bool_]:
+        """bool[n]: whether no skin of the first head lies before its own points.
+
+        Args:
+            points: float64[n, 3], of the skin.
+            ways: float64[n, 3], directions of length 1.
+            far: how far they look.
+        """
+        triangle, _, _ = self._closest.first_hit(points + 1e-3 * far * ways, ways, far)
+        return np.asarray(triangle < 0)
 
     def at(self, hold: Hold) -> Doubles:
         """float64[n, 3, 3]: the change of form where points are held."""

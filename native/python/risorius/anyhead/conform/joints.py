@@ -17,9 +17,10 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import Doubles
 from ...rigs.rotation import Convention
 from .change import Change
-from .parts import Eye, finest
+from .parts import Stiff, finest, kind
 
 _HELD = 1e-6  # the weight of all vertices from which on a joint has a place by them
+_SOME = 0.05  # of the meshes in the mouth: what a jaw carries at least, and leaves to the head
 Carried = Mapping[int, tuple[Doubles, Doubles, Doubles]]  # mesh -> before, after, linear
 
 
@@ -31,14 +32,14 @@ class Places:
         linear: float64[J, 3, 3], the change of form about each.
     """
 
-    def __init__(self, dna: Dna, carried: Carried, change: Change, eyes: Sequence[Eye]) -> None:
+    def __init__(self, dna: Dna, carried: Carried, change: Change, stiff: Stiff) -> None:
         """Finds them.
 
         Args:
             dna: the face.
             carried: vertices of meshes of the finest level.
             change: of its skin.
-            eyes: of the face.
+            stiff: parts of the face.
         """
         count = len(dna.joint_names)
         frames = sk.world_matrices(dna, np.zeros((count, 9)))
@@ -51,9 +52,13 @@ class Places:
         self.linear = sums[:, 6:].reshape(-1, 3, 3)
         away = self.before - sums[:, :3]
         self.after = sums[:, 3:6] + np.einsum("jik,jk->ji", self.linear, away)
-        for eye in eyes:
+        for eye in stiff.eyes:
             own = list(eye.joints)
             self.after[own] = eye.way(self.before[own])
+        inside = [m for m in carried if kind(dna.mesh_names[m]) == "mouth"]
+        jaw = jaw_of(dna, inside)
+        if stiff.mouth is not None and jaw >= 0:  # a jaw is one piece with its teeth
+            self.after[jaw] = stiff.mouth(self.before[jaw])
 
 
 def _means(dna: Dna, carried: Carried) -> Doubles:
@@ -109,6 +114,32 @@ def place_joints(out: Dna, places: Places, turn: Doubles) -> None:
         out.neutral_joint_rotations = rotations
 
 
+def jaw_of(dna: Dna, mouth: Sequence[int]) -> int:
+    """The joint that the lower teeth hang on; -1: there is none.
+
+    It turns, carries some of the meshes in the mouth and not all of them.
+
+    Args:
+        dna: the face.
+        mouth: the meshes in the mouth.
+    """
+    count = len(dna.joint_names)
+    held = np.zeros(count)
+    for m in mouth:
+        _, joint, weight = sk.skin_entries(dna.meshes[m])
+        held += np.bincount(joint, weights=weight, minlength=count)
+    whole = held.sum()
+    for at in reversed(sk.parent_order(dna)):
+        if int(dna.joint_parents[at]) != at:
+            held[int(dna.joint_parents[at])] += held[at]
+    turned = np.zeros(count, bool)
+    for group in dna.joint_groups:
+        rows = np.asarray(group.output_indices, np.int64)
+        turned[rows[(rows % 9 >= 3) & (rows % 9 < 6)] // 9] = True
+    able = np.flatnonzero(turned & (held > _SOME * whole) & (held < (1 - _SOME) * whole))
+    return max(able.tolist(), key=lambda j: (held[j], -j), default=-1)
+
+
 def shifts_carried(dna: Dna, places: Places, turn: Doubles) -> list[JointGroup]:
     """The joint groups with shifts as they are on the other head.
 
@@ -121,23 +152,20 @@ def shifts_carried(dna: Dna, places: Places, turn: Doubles) -> list[JointGroup]:
     roots = parents == np.arange(len(parents))
     old = np.where(roots[:, None, None], np.eye(3), places.turns[parents])
     new = np.where(roots[:, None, None], np.eye(3), turn @ old)
-    mixing = np.einsum("jki,jkl,jlm->jim", new, places.linear, old)
-    return [_carried(group, mixing) for group in dna.joint_groups]
+    return [_carried(group, old, new, places) for group in dna.joint_groups]
 
 
-def _carried(group: JointGroup, mixing: Doubles) -> JointGroup:
+def _carried(group: JointGroup, old: Doubles, new: Doubles, places: Places) -> JointGroup:
     rows = np.asarray(group.output_indices, np.int64)
     values = np.asarray(group.values, np.float64).copy()
-    if not len(rows) or not values.size:
+    shift = np.flatnonzero((rows % 9 < 3) & (rows // 9 < len(old)))
+    if not len(shift) or not values.size:
         return group
-    shift = np.flatnonzero((rows % 9 < 3) & (rows // 9 < len(mixing)))
-    at = np.full((len(mixing), 3), -1)
-    at[rows[shift] // 9, rows[shift] % 9] = shift
-    old = values.copy()
     for joint in np.unique(rows[shift] // 9).tolist():
-        axes = np.flatnonzero(at[joint] >= 0)
-        own = at[joint, axes]
-        values[own] = mixing[joint][np.ix_(axes, axes)] @ old[own]
+        own = shift[rows[shift] // 9 == joint]
+        axes = rows[own] % 9
+        mixing = new[joint].T @ places.linear[joint] @ old[joint]
+        values[own] = mixing[np.ix_(axes, axes)] @ values[own]
     out = copy.copy(group)
     out.values = values
     return out

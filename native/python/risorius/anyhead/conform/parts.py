@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +22,9 @@ from .change import Change, Similar, similar
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
 _INNER = 0.35  # of an eye's radius: joints as near to its middle are the eye's
-_RIM, _BAND = 1.02, 0.12  # of the radius: where lids lie, and how thick their layer is
+_RIM, _BAND = 1.1, 0.03  # of the radius: where the rims of lids lie, and how far off they may
 _STIFF = 0.9  # of a vertex' weight that an eye's joints have, where it goes with the eye
-_PRIOR = 0.1  # of what the places of the rim count beside their distance from the eye
+_PRIOR = 0.01  # how much the skin around counts beside the distance of the rims
 _ROUNDS = 20
 
 
@@ -35,6 +36,14 @@ class Eye:
     radius: float
     way: Similar
     joints: frozenset[int]
+
+
+class Stiff(NamedTuple):
+    """The skin's mesh, the eyes, and what the inside of the mouth does."""
+
+    skin: int
+    eyes: Sequence[Eye]
+    mouth: Similar | None
 
 
 def kind(name: str) -> str:
@@ -144,33 +153,33 @@ def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
 
 
 def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
-    """An eyeball whose distance from the lids is as it was.
+    """An eyeball whose distance from the rims of the lids grows as it does.
 
-    The rim of the lids is a band of a sphere: it says well where the eye is from the front and less
-    well how large it is, so what the skin around does counts too.
+    Rims are a narrow band of a sphere: they say well where the eye is, and together with what the
+    skin around does how large it is.
     """
     start = change.around(middle, radius)
     away = change.before.points - middle
     far = np.linalg.norm(away, axis=1)
     share = np.exp(-(((far / radius - _RIM) / _BAND) ** 2) / 2)
     near = np.flatnonzero(share > 1e-3)
+    near = near[change.sees(change.before.points[near], away[near] / far[near, None], 3 * radius)]
     if len(near) < 12:
         return start
-    share, far, after = share[near], far[near], change.after.points[near]
-    turned = away[near] @ change.turn.T
-    place = np.append(start.becomes, np.cbrt(np.linalg.det(start.linear)))
+    far, after = far[near], change.after.points[near]
+    share = share[near] / share[near].sum()
+    first = np.append(start.becomes, start.size)
+    prior = _PRIOR * np.diag([1.0, 1.0, 1.0, radius**2])
+    place = first.copy()
     for _ in range(_ROUNDS):
         to = after - place[:3]
         length = np.maximum(np.linalg.norm(to, axis=1), 1e-12)
-        off = length - place[3] * far
         rows = np.column_stack([-to / length[:, None], -far])
-        apart = (to - place[3] * turned).reshape(-1)
-        more = np.column_stack([np.tile(-np.eye(3), (len(near), 1)), -turned.reshape(-1)])
-        weight = _PRIOR * np.repeat(share, 3)
-        left = rows.T @ (share[:, None] * rows) + more.T @ (weight[:, None] * more)
-        right = rows.T @ (share * off) + more.T @ (weight * apart)
-        step = np.linalg.solve(left, right)
+        off = rows.T @ (share * (length - place[3] * far)) + prior @ (place - first)
+        step = np.linalg.solve(rows.T @ (share[:, None] * rows) + prior, off)
         place = place - step
         if np.abs(step[:3]).max() < 1e-9 * radius:
             break
+    if place[3] <= 0:
+        return start
     return Similar(place[3] * change.turn, middle, place[:3])

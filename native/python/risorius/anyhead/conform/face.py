@@ -16,19 +16,11 @@ from ... import BlendShapeTarget, Dna, Mesh
 from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
-from .change import Change, Similar, similar, surface_of
+from .change import Change, similar, surface_of
 from .joints import Places, place_joints, shifts_carried
-from .parts import Eye, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
+from .parts import Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
 Progress = Callable[[float], object]
-
-
-class Stiff(NamedTuple):
-    """The skin's mesh, the eyes, and what the inside of the mouth does."""
-
-    skin: int
-    eyes: Sequence[Eye]
-    mouth: Similar | None
 
 
 class Moved(NamedTuple):
@@ -70,7 +62,7 @@ def conform(dna: Dna, moved: Mapping[str, Doubles], progress: Progress | None = 
         if len(dna.meshes[m].positions):
             meshes[m] = _moved(dna, m, change, stiff, given)
         tell(0.2 + 0.5 * (m + 1) / len(dna.meshes))
-    places = Places(dna, {m: meshes[m] for m in finest(dna)}, change, stiff.eyes)
+    places = Places(dna, {m: meshes[m] for m in finest(dna)}, change, stiff)
     out = copy.copy(dna)
     out.meshes = [
         _mesh(mesh, meshes[m]) if m in meshes else mesh for m, mesh in enumerate(dna.meshes)
