@@ -18,7 +18,7 @@ from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
 from .change import Change, similar, surface_of
 from .joints import Places, place_joints, shifts_carried
-from .parts import Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
+from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
 Progress = Callable[[float], object]
 
@@ -31,7 +31,12 @@ class Moved(NamedTuple):
     linear: Doubles
 
 
-def conform(dna: Dna, moved: Mapping[str, Doubles], progress: Progress | None = None) -> Dna:
+def conform(
+    dna: Dna,
+    moved: Mapping[str, Doubles],
+    progress: Progress | None = None,
+    balls: Sequence[Ball] = (),
+) -> Dna:
     """The face with another head's form: the same names, counts and layers.
 
     Meshes that `moved` does not name follow the skin: what lies on it by the nearest place, eyes as
@@ -44,6 +49,7 @@ def conform(dna: Dna, moved: Mapping[str, Doubles], progress: Progress | None = 
         moved: float64[V, 3] by mesh name, in the file's axes and unit: where vertices lie now;
             the skin of LOD 0 at least.
         progress: hears the share that is done, 0 to 1; what it raises ends the work.
+        balls: eyes of the other head, which those of the face take the places of.
 
     Raises:
         ArgumentError: the face has no skin, or `moved` lacks it, names another mesh, or has
@@ -56,7 +62,7 @@ def conform(dna: Dna, moved: Mapping[str, Doubles], progress: Progress | None = 
     change = Change(dna.meshes[skin], before, given[dna.mesh_names[skin]])
     tell(0.2)
     world = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
-    stiff = Stiff(skin, eyes_of(dna, change, given, world), mouth_way(dna, change))
+    stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth_way(dna, change))
     meshes: dict[int, Moved] = {}
     for m in range(min(len(dna.meshes), len(dna.mesh_names))):
         if len(dna.meshes[m].positions):

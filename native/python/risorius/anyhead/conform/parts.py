@@ -38,6 +38,13 @@ class Eye:
     joints: frozenset[int]
 
 
+class Ball(NamedTuple):
+    """An eyeball of the other head, in the face's axes, unit and place."""
+
+    middle: Doubles
+    radius: float
+
+
 class Stiff(NamedTuple):
     """The skin's mesh, the eyes, and what the inside of the mouth does."""
 
@@ -99,7 +106,13 @@ def mouth_way(dna: Dna, change: Change) -> Similar | None:
     return change.around((low + high) / 2, float(np.linalg.norm(high - low)) / 2)
 
 
-def eyes_of(dna: Dna, change: Change, moved: Mapping[str, Doubles], world: Doubles) -> list[Eye]:
+def eyes_of(
+    dna: Dna,
+    change: Change,
+    moved: Mapping[str, Doubles],
+    world: Doubles,
+    balls: Sequence[Ball] = (),
+) -> list[Eye]:
     """The eyeballs of a face.
 
     Args:
@@ -108,6 +121,7 @@ def eyes_of(dna: Dna, change: Change, moved: Mapping[str, Doubles], world: Doubl
         moved: float64[V, 3] by mesh, where vertices lie on the other head; an eye that is there
             goes there.
         world: float64[J, 3], where the joints are.
+        balls: eyes of the other head.
     """
     out: list[Eye] = []
     for m in finest(dna):
@@ -127,7 +141,7 @@ def eyes_of(dna: Dna, change: Change, moved: Mapping[str, Doubles], world: Doubl
             if name in moved:
                 way = similar(points[vertices], moved[name][vertices], change)
             else:
-                way = _in_lids(change, middle, radius)
+                way = _in_ball(_in_lids(change, middle, radius), radius, balls)
             out.append(Eye(middle, radius, way, frozenset(joints.tolist())))
     return out
 
@@ -150,6 +164,16 @@ def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
     label = pieces_of(mesh)
     pieces = [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
     return sorted(pieces, key=lambda own: -float(np.ptp(points[own], axis=0).max()))
+
+
+def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
+    """An eyeball where the other head has one, near the place that its lids say."""
+    near = [b for b in balls if np.linalg.norm(b.middle - way.becomes) < way.size * radius]
+    if not near:
+        return way
+    ball = min(near, key=lambda b: float(np.linalg.norm(b.middle - way.becomes)))
+    linear = ball.radius / (way.size * radius) * way.linear
+    return Similar(linear, way.middle, np.asarray(ball.middle, np.float64))
 
 
 def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
