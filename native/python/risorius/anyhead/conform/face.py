@@ -16,11 +16,12 @@ from ... import BlendShapeTarget, Dna, Mesh
 from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
+from ..errors import Stopped
 from .change import Change, similar, surface_of
 from .joints import Places, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
-Progress = Callable[[float], object]
+Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
 
 
 class Moved(NamedTuple):
@@ -48,14 +49,15 @@ def conform(
         dna: stays as it is.
         moved: float64[V, 3] by mesh name, in the file's axes and unit: where vertices lie now;
             the skin of LOD 0 at least.
-        progress: hears the share that is done, 0 to 1; what it raises ends the work.
+        progress: told the share that is done, 0 to 1; False stops.
         balls: eyes of the other head, which those of the face take the places of.
 
     Raises:
         ArgumentError: the face has no skin, or `moved` lacks it, names another mesh, or has
             places of another number or that are no places.
+        Stopped: progress said False.
     """
-    tell = progress or (lambda share: None)
+    tell = telling(progress, 0.0, 1.0)
     skin = skin_of(dna)
     given = _checked(dna, moved, skin)
     before = np.asarray(dna.meshes[skin].positions, np.float64)
@@ -78,6 +80,23 @@ def conform(
     out.joint_groups = shifts_carried(dna, places, change.turn)
     tell(1.0)
     return out
+
+
+def telling(progress: Progress | None, begin: float, end: float) -> Callable[[float], bool]:
+    """What tells the progress of a part of the work. Raises: Stopped: it said False.
+
+    Args:
+        progress: of the whole.
+        begin: share of the whole where the part begins.
+        end: where it ends.
+    """
+
+    def tell(share: float) -> bool:
+        if progress is not None and progress(begin + (end - begin) * share) is False:
+            raise Stopped
+        return True
+
+    return tell
 
 
 def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Doubles]:

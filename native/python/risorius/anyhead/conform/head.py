@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,11 +26,9 @@ from ..registration import RegisterOptions, StoppedError, register
 from ..standing import Standing, stand
 from ..surface import Surface
 from .change import surface_of
-from .face import conform
+from .face import Progress, conform, telling
 from .parts import Ball, skin_of
 from .same import has_polygons_of, into_own_space, sculpted, turn_back
-
-Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
 
 _DIRECTIONS = {
     "right": (1, 0, 0),
@@ -108,12 +106,12 @@ def conform_face(
             factor = wishes.height_mm / mm_of(dna) / float(np.ptp(moved[name], axis=0).max())
         there, note = into_own_space(dna, moved, factor)
         notes = [f"{joined(list(there))}: the head has the face's own polygons", note]
-        made = conform(dna, there, _tells(progress, 0.0, 1.0))
+        made = conform(dna, there, telling(progress, 0.0, 1.0))
         return Conformed(made, there[name], list(there), [n for n in notes if n])
     standing = stand(where, parts, unit, wishes, marks)
-    _tells(progress, 0.0, _STOOD)(1.0)
+    telling(progress, 0.0, _STOOD)(1.0)
     points, balls = _laid(dna, skin, standing, threads, progress)
-    made = conform(dna, {name: points}, _tells(progress, _LAID, 1.0), balls)
+    made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls)
     return Conformed(made, points, [], standing.notes)
 
 
@@ -140,7 +138,7 @@ def _laid(
             [(vertex, point.tolist()) for vertex, point in pairs],
             RegisterOptions(threads=threads),
             start_of(template, target, own, found),
-            _tells(progress, _STOOD, _LAID),
+            telling(progress, _STOOD, _LAID),
         )
     except StoppedError:
         raise Stopped from None
@@ -212,14 +210,3 @@ def standing_axes(dna: Dna) -> Doubles:
 def mm_of(dna: Dna) -> float:
     """Millimetres of a unit of the file."""
     return UNITS.get(dna.translation_unit, UNITS["cm"])
-
-
-def _tells(progress: Progress | None, begin: float, end: float) -> Callable[[float], bool]:
-    """What tells a part of the work. Raises: Stopped: progress said False."""
-
-    def tell(share: float) -> bool:
-        if progress is not None and progress(begin + (end - begin) * share) is False:
-            raise Stopped
-        return True
-
-    return tell

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
@@ -87,10 +86,9 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
         wishes=wishes,
         threads=args.threads,
     )
-    _rename(made.dna, args.out)
     pictures, _ = mix_textures([dna], [args.spec], Mix([1.0]), Masks(dna))
     folder = texture_folder(args.out)
-    data = made.dna.to_bytes(f"2.{dna.version}")
+    data = made.dna.to_bytes(f"2.{min(max(dna.version, 1), 8)}")
     fileio.write_all({args.out: data} | {folder / n: own for n, own in pictures.items()})
     if args.json:
         print(json.dumps(as_json(dna, made)))
