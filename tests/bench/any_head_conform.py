@@ -16,7 +16,6 @@ import argparse
 import time
 
 import numpy as np
-
 import risorius
 from risorius.anyhead.conform import conform
 from risorius.anyhead.conform.parts import skin_of
@@ -67,7 +66,10 @@ def main():
     name = dna.mesh_names[skin_of(dna)]
     source = Posed(dna)
     rows = []
-    print(f"{'head':22} {'seconds':>7}  conformed: mean 95 % largest   copied: mean 95 % largest   mean over 0.3, 95 % over 1.2")
+    print(
+        f"{'head':22} {'seconds':>7}   conformed: mean, 95 %, largest   copied: the same   ", end=""
+    )
+    print("over 0.3 in the mean, over 1.2 at 95 %")
     for path in args.heads:
         with np.load(path) as file:
             points, true = file[f"{name}/points"], file[f"{name}/deltas"].astype(np.float64)
@@ -86,7 +88,13 @@ def main():
         table = np.array(list(own.values()))
         rows.append(table)
         over = (table[:, 0] > 0.3).sum(), (table[:, 1] > 1.2).sum()
-        print(path.rsplit("/", 1)[-1].ljust(22), f"{took:7.1f}  ", _line(table), f"   {over[0]}, {over[1]} of {len(table)}", flush=True)
+        print(
+            path.rsplit("/", 1)[-1].ljust(22),
+            f"{took:7.1f}  ",
+            _line(table),
+            f"   {over[0]}, {over[1]} of {len(table)}",
+            flush=True,
+        )
         for expression in sorted(own, key=lambda e: -own[e][0])[: args.worst]:
             print("    ", expression[:60].ljust(60), *(f"{x:6.3f}" for x in own[expression]))
     print("all".ljust(22), " " * 9, _line(np.concatenate(rows)))
@@ -94,8 +102,10 @@ def main():
 
 def _line(table):
     mean = table.mean(axis=0)
-    return " ".join(f"{x:7.3f}" for x in (mean[0], mean[1], table[:, 2].max())) + "   " + " ".join(
-        f"{x:7.3f}" for x in (mean[3], mean[4], table[:, 5].max())
+    return (
+        " ".join(f"{x:7.3f}" for x in (mean[0], mean[1], table[:, 2].max()))
+        + "   "
+        + " ".join(f"{x:7.3f}" for x in (mean[3], mean[4], table[:, 5].max()))
     )
 
 

@@ -24,7 +24,12 @@ from ..surface import Surface
 _EVENED = 0.24  # of the skin's spread, which is 8.4 cm of a head of 24: 2 cm
 _CELL = 0.4  # of that: vertices so close are one to the others
 _STEADY = 1e-6
+_NORMAL = 0.25  # of the squares of edges: how much the normal counts, whose stretch nobody sees
 _AT_ONCE = 1024
+# The same place of the texture counts where it is not much farther than the nearest place: times,
+# and of the reach; _SAME_TEXEL of the texture's width.
+_LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
+_NO_TEXTURE = 1e-6  # a texture as small as that is none
 _TURNED = 0.5  # what a turn leaves of the difference at most, where the head is turned
 
 
@@ -90,6 +95,9 @@ class Change:
             after: float64[V, 3], on the other one.
         """
         self.before, self.after = surface_of(mesh, before), surface_of(mesh, after)
+        coordinates = np.asarray(mesh.layout_texture_coordinates, np.int64)
+        rows = _flat(np.asarray(mesh.texture_coordinates, np.float64))
+        self._flat = rows, coordinates[fan_triangles(mesh)]
         self.turn, self.size = turn_of(before, after)
         spread = float(np.sqrt(((before - before.mean(axis=0)) ** 2).sum(axis=1).mean()))
         self.reach = _EVENED * max(spread, 1e-12)
@@ -109,8 +117,8 @@ class Change:
         grown = _sums(start, np.einsum("ni,ni->n", b, b)[:, None, None], count)[:, 0, 0]
         grown = np.sqrt(grown / np.maximum(square, 1e-300))
         flat, bent = self.before.normals(), self.after.normals()
-        mixed += (square * grown / 2)[:, None, None] * bent[:, :, None] * flat[:, None, :]
-        own += (square / 2)[:, None, None] * flat[:, :, None] * flat[:, None, :]
+        mixed += (_NORMAL * square * grown)[:, None, None] * bent[:, :, None] * flat[:, None, :]
+        own += (_NORMAL * square)[:, None, None] * flat[:, :, None] * flat[:, None, :]
         both = self._spread(np.concatenate([mixed.reshape(-1, 9), own.reshape(-1, 9)], axis=1))
         mixed, own = both[:, :9].reshape(-1, 3, 3), both[:, 9:].reshape(-1, 3, 3)
         steady = np.einsum("vii->v", own)[:, None, None] * _STEADY
@@ -145,20 +153,52 @@ class Change:
     def _closest(self) -> _native.ClosestPoints:
         return _native.ClosestPoints(self.before.points, self.before.triangles.astype(np.int32))
 
-    def hold(self, points: Doubles, normals: Doubles | None = None) -> Hold:
+    @cached_property
+    def _texture(self) -> _native.ClosestPoints | None:
+        """The skin laid flat as its texture is; None: it has none."""
+        rows, corners = self._flat
+        if not len(rows) or np.ptp(rows, axis=0).max() < _NO_TEXTURE:
+            return None
+        return _native.ClosestPoints(rows, corners.astype(np.int32))
+
+    def hold(self, points: Doubles, mesh: Mesh | None = None) -> Hold:
         """Where the skin of the first head holds points that lie near it.
+
+        Lips and lids lie on each other, so the nearest place may be on the wrong one: places that
+        look the same way go first, and the same place of the texture where it is near enough.
 
         Args:
             points: float64[n, 3].
-            normals: float64[n, 3] of the points; None: any side of the skin may hold them.
+            mesh: whose vertices the points are; None: they look no way.
         """
-        found, places, _ = self._closest.nearest(points)
+        found, places, far = self._closest.nearest(points)
         triangle, shares = found.astype(np.int64), np.asarray(places)
-        if normals is not None:
+        if mesh is not None:
+            normals = surface_of(mesh, points).normals()
             found, places, _ = self._closest.nearest(points, normals, 0.0, self.reach)
             facing = found >= 0
             triangle[facing], shares[facing] = found[facing], places[facing]
+            same, places = self._by_texture(mesh)
+            there = self.before.at(np.maximum(same, 0), places)
+            off = np.linalg.norm(there - points, axis=1)
+            near = (same >= 0) & (off <= _LONGER * np.asarray(far) + _BESIDE * self.reach)
+            triangle[near], shares[near] = same[near], places[near]
         return Hold(triangle, shares, points - self.before.at(triangle, shares))
+
+    def _by_texture(self, mesh: Mesh) -> tuple[Ints, Doubles]:
+        """int64[V], float64[V, 3]: the triangle that has a vertex' place of the texture, -1: none
+        has, and the place in it."""
+        count = len(mesh.positions)
+        none = np.full(count, -1), np.full((count, 3), 1 / 3)
+        rows = _flat(np.asarray(mesh.texture_coordinates, np.float64))
+        if self._texture is None or not len(rows):
+            return none
+        at = np.full(count, -1)
+        own = np.asarray(mesh.layout_texture_coordinates, np.int64)
+        at[np.asarray(mesh.layout_positions, np.int64)] = own
+        found, places, _ = self._texture.nearest(rows[at], farthest=_SAME_TEXEL)
+        triangle = np.where(at >= 0, found.astype(np.int64), -1)
+        return triangle, np.where(triangle[:, None] >= 0, np.asarray(places), none[1])
 
     def sees(self, points: Doubles, ways: Doubles, far: float) -> npt.NDArray[np.bool_]:
         """bool[n]: whether no skin of the first head lies before its own points.
@@ -235,6 +275,14 @@ def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
     turn = turn if left[1] < _TURNED**2 * left[0] else np.eye(3)
     size = float((b * (a @ turn.T)).sum()) / square
     return turn, size if size > 0 else 1.0
+
+
+def _flat(coordinates: Doubles) -> Doubles:
+    """float64[n, 3] of texture coordinates float64[n, 2]; none where one is no number."""
+    rows = coordinates.reshape(-1, 2)
+    if not np.isfinite(rows).all():
+        return np.zeros((0, 3))
+    return np.column_stack([rows, np.zeros(len(rows))])
 
 
 def _sums(rows: Ints, values: Doubles, count: int) -> Doubles:

@@ -149,11 +149,11 @@ def _with_eyes(points: Doubles, eyes: Sequence[Eye]) -> Moved:
 
 def _on_skin(mesh: Mesh, points: Doubles, change: Change, eyes: Sequence[Eye]) -> Moved:
     """Vertices on the nearest place of the skin; those that an eye's joints hold, on the eye."""
-    hold = change.hold(points, surface_of(mesh, points).normals())
+    hold = change.hold(points, mesh)
     linear = change.at(hold)
     after = change.carried(hold, linear)
     for eye in eyes:
-        own = stiff_share(mesh, eye.joints)
+        own = stiff_share(mesh, eye.holds)
         after[own], linear[own] = eye.way(points[own]), eye.way.linear
     return Moved(points, after, linear)
 

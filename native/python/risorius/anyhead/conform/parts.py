@@ -30,12 +30,21 @@ _ROUNDS = 20
 
 @dataclass(frozen=True)
 class Eye:
-    """An eyeball: middle float64[3] and radius on the first head, and where it comes to."""
+    """An eyeball.
+
+    Attributes:
+        middle: float64[3], and
+        radius: on the first head.
+        way: where it comes to.
+        joints: at its middle, as those of lids are that slide on it.
+        holds: joints that hold it.
+    """
 
     middle: Doubles
     radius: float
     way: Similar
     joints: frozenset[int]
+    holds: frozenset[int]
 
 
 class Ball(NamedTuple):
@@ -142,7 +151,8 @@ def eyes_of(
                 way = similar(points[vertices], moved[name][vertices], change)
             else:
                 way = _in_ball(_in_lids(change, middle, radius), radius, balls)
-            out.append(Eye(middle, radius, way, frozenset(joints.tolist())))
+            holds = _holding(mesh, vertices, len(world))
+            out.append(Eye(middle, radius, way, frozenset(joints.tolist()), holds))
     return out
 
 
@@ -157,6 +167,14 @@ def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
     own = weight * np.isin(joint, list(joints))
     held = np.bincount(vertex, weights=own, minlength=len(mesh.positions))
     return np.asarray(held > _STIFF)
+
+
+def _holding(mesh: Mesh, vertices: Ints, joints: int) -> frozenset[int]:
+    """The joints that hold most of some vertices."""
+    vertex, joint, weight = sk.skin_entries(mesh)
+    own = np.isin(vertex, vertices)
+    held = np.bincount(joint[own], weights=weight[own], minlength=joints)
+    return frozenset(np.flatnonzero(held > held.sum() / 2).tolist())
 
 
 def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
