@@ -117,7 +117,12 @@ def _moved_mm(dna: Dna, made: Conformed) -> tuple[float, float]:
 
 
 def as_json(dna: Dna, made: Conformed) -> dict[str, object]:
-    """What became of the face, for a program."""
+    """What became of the face, for a program.
+
+    Args:
+        dna: the face before.
+        made: after.
+    """
     mean, largest = _moved_mm(dna, made)
     return {
         "registered": not made.sculpted,
