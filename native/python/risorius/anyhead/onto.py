@@ -125,7 +125,8 @@ def onto(
     )  # fmt: skip
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
-    return Onto(shapes, head.own, [*notes, *head.notes, *joined.notes])
+    # The first sentence of these is of the direction, which is told already.
+    return Onto(shapes, head.own, [*notes, *head.notes, *joined.notes[1:]])
 
 
 def shape_face(made: Onto, template: Dna, where: str) -> Read:

@@ -12,7 +12,7 @@ import numpy as np
 from ..author.geometry.skeleton import Doubles
 from ..author.heads.directions import axis_of, check_axes, word_of
 from ..author.heads.parts import HeadPart, Wishes
-from ..author.heads.sizes import UNITS, check_unit, find_unit, in_words
+from ..author.heads.sizes import UNITS, check_unit, find_unit
 from ..author.input.obj import ObjMesh
 from ..web.kinds import kind_of
 from .errors import AnyHeadError
@@ -132,8 +132,7 @@ def _factor(height: float, unit: str, wishes: Wishes) -> tuple[float, list[str]]
     scale = wishes.scale or 1.0
     sure = bool(wishes.unit or wishes.scale)
     found, odd = find_unit(height * scale, wishes.unit or unit, sure=sure)
-    note = odd or f"the face is {in_words(height * scale * UNITS[found])} high"
-    return scale * UNITS[found] / UNITS["cm"], [note]
+    return scale * UNITS[found] / UNITS["cm"], [odd] if odd else []
 
 
 def _stood(part: HeadPart, turn: Doubles) -> HeadPart:

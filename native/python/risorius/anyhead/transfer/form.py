@@ -15,6 +15,7 @@ from ..surface import Surface
 from .smoothing import Smoothing, areas
 
 EVENED = 2.0  # cm, over which changes of form are evened out
+_UNSURE = 0.3  # how much a place counts that registration carried along with others
 _STEADY = 1e-6  # of a form's size: what a flat place says nothing about stays as it is
 
 
@@ -27,7 +28,7 @@ def changes_of_form(before: Surface, after: Doubles, trust: Doubles) -> Doubles:
         trust: float64[V], 0 to 1: how much each vertex of `after` is to count.
     """
     mixed, own = _sums(before, after)
-    share = np.maximum(trust, 1e-3)[:, None]
+    share = np.maximum(trust, _UNSURE)[:, None]
     sums = np.concatenate([mixed.reshape(-1, 9) * share, own.reshape(-1, 9) * share], axis=1)
     even = Smoothing(before).solver(areas(before), EVENED / np.sqrt(2)).solve(sums)
     mixed, own = even[:, :9].reshape(-1, 3, 3), even[:, 9:].reshape(-1, 3, 3)

@@ -18,10 +18,8 @@ from .smoothing import Smoothing, areas
 _FACING = 0.4  # least cosine between normals of places that may be the same
 _FARTHEST = 1.5  # cm
 _NEAR = 0.3  # cm: a place so far off holds its value a third as much
-_UNSURE = 0.02  # of a sure vertex: how much one holds that registration could not place
-_EVENED = 0.1  # cm, over which values are evened out
-_ASIDE = 0.4  # cm, over which neighbours are asked whether a value fits theirs
-_OUTLIER = 0.1  # cm: a value so far from its neighbours' holds half as much
+_UNSURE = 0.5  # of a sure vertex: how much one holds that registration carried along with others
+_EVENED = 0.05  # cm, over which values are evened out
 _AT_REST = 1e-7  # of the area: what hangs on no known place rests
 
 
@@ -37,7 +35,6 @@ class Spreading:
         target: Surface,
         template: Surface,
         trust: Doubles,
-        parting: Doubles | None = None,
         threads: int = 0,
     ) -> None:
         """Finds the places and factorises.
@@ -46,8 +43,6 @@ class Spreading:
             target: the head, cm.
             template: the template's triangles, its points on the head.
             trust: float64[template vertices], 0 to 1: how sure the place of each is.
-            parting: float64[template vertices, n], ways that part neighbouring places, such as lips
-                and lids: a vertex whose nearest place lies on the other side is found by them.
             threads: 0: one for each core.
         """
         self._of, first = _merged(target)
@@ -63,21 +58,10 @@ class Spreading:
         sure = np.einsum("nk,nk->n", self._shares, np.maximum(trust, _UNSURE)[self._corners])
         near = np.exp(-np.square(np.where(found, distance, _FARTHEST) / _NEAR))
         self._held = np.where(found, sure * near, 0.0)
-        area, smoothing = areas(merged), Smoothing(merged)
-        if parting is not None:
-            self._held *= self._fitting(smoothing, area, parting)
         self.known = self._held[self._of]
+        area = areas(merged)
         self._held *= area
-        self._solver = smoothing.solver(self._held + _AT_REST * area, _EVENED)
-
-    def _fitting(self, smoothing: Smoothing, area: Doubles, parting: Doubles) -> Doubles:
-        """float64[n], 0 to 1: how well the value of each vertex fits those of its neighbours."""
-        held = self._held * area
-        solver = smoothing.solver(held + _AT_REST * area, _ASIDE)
-        values = self._values(parting)
-        even = solver.solve(values * held[:, None], self._threads)
-        off = np.linalg.norm((values - even).reshape(len(values), -1, 3), axis=2).max(axis=1)
-        return 1.0 / (1.0 + np.square(off / _OUTLIER))
+        self._solver = Smoothing(merged).solver(self._held + _AT_REST * area, _EVENED)
 
     def _values(self, values: Doubles) -> Doubles:
         """float64[n, k] at the places of the vertices, of values of the template's vertices."""

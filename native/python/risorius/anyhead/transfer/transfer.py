@@ -15,7 +15,6 @@ from .spreading import Spreading
 from .template import Floats, Pose, Progress, TemplateFace
 
 _AT_ONCE = 24  # poses that are solved together
-_PARTING = 8  # of them, which say whether a vertex is above or below a slit
 _LEAST = 1e-3  # cm: a vertex that moves less rests
 STRENGTHS = (0.0, 1.5)
 
@@ -74,7 +73,7 @@ def transfer(
     ways = Carrying(face, points, trust).ways(o.strength)
     _tell(progress, 0.1)
     lying = Surface(points, face.surface.triangles)
-    spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)
+    spreading = Spreading(target, lying, trust, o.threads)
     if not (spreading.known > 0.1).any():
         raise AnyHeadError("the template lies on no part of the head: landmarks may be wrong")
     _tell(progress, 0.2)
@@ -94,15 +93,3 @@ def _tell(progress: Progress | None, share: float) -> None:
     if progress is not None and progress(share) is False:
         raise Stopped
 
-
-def _parting(face: TemplateFace, ways: dict[Pose, Doubles]) -> Doubles | None:
-    """float64[T, 3 n]: the poses in which some edge of the template grows most: lips and lids
-    part in them."""
-    edges = face.surface.edges()
-    grown = {}
-    for pose, way in ways.items():
-        if len(pose) == 1:
-            apart = np.linalg.norm(way[edges[:, 0]] - way[edges[:, 1]], axis=1)
-            grown[pose] = float(np.sort(apart)[-len(apart) // 100 :].mean())
-    most = sorted(grown, key=lambda pose: -grown[pose])[:_PARTING]
-    return np.concatenate([ways[pose] for pose in most], axis=1) if most else None
