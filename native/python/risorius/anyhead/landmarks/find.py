@@ -14,6 +14,7 @@ from ..form.heads import head_form
 from ..form.standing import find_standing
 from ..surface import Surface
 from .marks import FOUND, MOVED, LandmarkError, Landmarks
+from .refine import refined
 
 _NO_FACE = 0.25  # cm of the form: a surface that fits worse has no face
 _HELD = 60.0  # how much a given landmark counts
@@ -74,15 +75,13 @@ def find_form(target: Surface, hints: Hints | None = None) -> Found:
         LandmarkError: there is no face in it, or one that cannot be used; says which.
     """
     hints = hints or Hints()
-    form = head_form()
     seen = Target(target)
     best = find_standing(seen, hints.up, hints.front, _held(hints))[0]
     if best.error > _NO_FACE:
         raise LandmarkError(f"{hints.where}: no face was found in the mesh")
-    points = best.pose.points(form)
     landmarks = Landmarks()
-    for name, vertex in form.places.items():
-        landmarks.points[name], landmarks.how[name] = points[vertex], FOUND
+    for name, point in refined(seen, best.pose).items():
+        landmarks.points[name], landmarks.how[name] = point, FOUND
     for name, point in hints.marks.items():
         landmarks.points[name], landmarks.how[name] = np.asarray(point, np.float64), MOVED
     return Found(landmarks, best.pose, best.error)
