@@ -3,6 +3,7 @@
 
 import copy
 import json
+from types import SimpleNamespace
 
 import face_shapes
 import jointed_face
@@ -11,15 +12,17 @@ import oracle
 import pytest
 import risorius
 import skin_oracle
-from risorius.anyhead.conform import conform, conform_face, is_same_topology
+from risorius.anyhead.conform import conform, conform_face, head, is_same_topology
 from risorius.anyhead.conform.parts import Ball
 from risorius.anyhead.errors import Stopped
+from risorius.anyhead.registration import Registered
 from risorius.author.geometry import skeleton as sk
 from risorius.author.heads.parts import HeadPart
 from risorius.author.input.obj import ObjMesh
 from risorius.base.errors import ArgumentError
 from risorius.cli import main
 
+pytestmark = pytest.mark.filterwarnings("ignore:.*several axes")
 SKIN = "head_lod0_mesh"
 LID = 12  # a joint of the skin
 EYES = {"eyeLeft_lod0_mesh": (6, (3, 3, 6)), "eyeRight_lod0_mesh": (7, (-3, 3, 6))}
@@ -249,6 +252,55 @@ def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
     assert not is_same_topology(face, shuffled.mesh)
 
 
+def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
+    """The steps before are known by other tests: here they give what they shall."""
+    system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
+    mirrored = face.convert(**system, face_winding_order="ccw")
+    points = stretched(skin_points(face))  # cm, standing
+    lean = sk.matrices_of_vectors(np.array([0, np.pi / 2, 0]))
+    given = 1.0 * points @ lean.T + [40, -3, 7]
+    marks = {f"eye_{place}_{s}": np.zeros(3) for place in ("inner", "outer") for s in "LR"}
+    found = SimpleNamespace(landmarks=SimpleNamespace(points=marks), pose=SimpleNamespace(scale=1))
+    part = as_part(face, given)
+    part.mesh.faces.reverse()
+    part.mesh.faces[0] = [0, 30, 77]  # no polygon of the face
+    standing = SimpleNamespace(parts=[part], found=found, notes=["as it is"])
+    monkeypatch.setattr(head, "stand", lambda *_: standing)
+    monkeypatch.setattr(head, "find_form", lambda *_: found)
+    monkeypatch.setattr(head, "start_of", lambda *_: None)
+    seen = []
+
+    def register(template, target, pairs, options, start, progress):
+        seen.append((template, target))
+        progress(1.0)
+        sure = np.ones(len(given), bool)
+        return Registered(given, np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros(0), sure)
+
+    monkeypatch.setattr(head, "register", register)
+    heard = []
+    made = conform_face(mirrored, [part], None, heard.append)
+    template, target = seen[0]
+    assert np.abs(template.points - skin_points(face)).max() < 1e-4
+    assert (template.normals()[:, 2] > 0).mean() > 0.9
+    assert np.abs(target.points - given).max() < 1e-9
+    x, y, z = (points - points.mean(axis=0) + skin_points(face).mean(axis=0)).T / 100
+    assert np.abs(made.moved - np.stack([z, -x, -y], axis=1)).max() < 1e-6
+    assert made.notes == ["as it is"]
+    assert made.sculpted == []
+    assert heard == sorted(heard)
+    assert heard[-1] == 1.0
+    with pytest.raises(Stopped):
+        conform_face(mirrored, [part], None, lambda share: share < 0.5)
+
+
+def test_meshes_of_another_face_are_a_head(face):
+    other = conform(face, {SKIN: stretched(skin_points(face))})
+    made = conform_face(face, head.parts_of(other.convert(axes=("right", "front", "up"))))
+    assert made.sculpted == [SKIN, *EYES]
+    for a, b in zip(made.dna.meshes, other.meshes, strict=True):
+        assert np.abs(a.positions - b.positions).max() < 1e-3
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -295,6 +347,7 @@ def test_the_command_writes_the_face_of_a_sculpt(face, tmp_path, capsys):
     for more, code, sentence in (
         (["--bound"], 2, "--conform takes no --bound"),
         (["--scale", "nan"], 2, "--scale"),
+        (["--height-mm", "240"], 1, "the head has the face's own polygons"),
     ):
         assert main([str(word) for word in [*command, *more]]) == code
         assert sentence in capsys.readouterr().err

@@ -27,7 +27,7 @@ from ..standing import Standing, stand
 from ..surface import Surface
 from .change import surface_of
 from .face import Progress, conform, telling
-from .parts import Ball, skin_of
+from .parts import Ball, finest, skin_of
 from .same import has_polygons_of, into_own_space, sculpted, turn_back
 
 _DIRECTIONS = {
@@ -87,10 +87,9 @@ def conform_face(
         threads: 0: one for each core.
 
     Raises:
-        AnyHeadError: no polygons, or wishes that cannot be.
+        AnyHeadError: no polygons, no skin to the face, or wishes that cannot be.
         LandmarkError: no face, or landmarks that are missing.
         RegistrationError: nothing of the head near the face.
-        ArgumentError: the face has no skin.
         Stopped: progress said False.
     """
     wishes = wishes or Wishes()
@@ -101,10 +100,12 @@ def conform_face(
     named = [part for part in parts if part.source == wishes.mesh] if wishes.mesh else parts
     moved = sculpted(dna, named)
     if name in moved:
-        factor = wishes.scale or None
         if wishes.height_mm:
-            factor = wishes.height_mm / mm_of(dna) / float(np.ptp(moved[name], axis=0).max())
-        there, note = into_own_space(dna, moved, factor)
+            raise AnyHeadError(
+                f"{where}: the head has the face's own polygons and is as large as its numbers "
+                "say; scale multiplies them, a height was not expected"
+            )
+        there, note = into_own_space(dna, moved, wishes.scale or None)
         notes = [f"{joined(list(there))}: the head has the face's own polygons", note]
         made = conform(dna, there, telling(progress, 0.0, 1.0))
         return Conformed(made, there[name], list(there), [n for n in notes if n])
@@ -113,6 +114,22 @@ def conform_face(
     points, balls = _laid(dna, skin, standing, threads, progress)
     made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls)
     return Conformed(made, points, [], standing.notes)
+
+
+def parts_of(dna: Dna) -> list[HeadPart]:
+    """The meshes of LOD 0 of a face, as those of a head.
+
+    Args:
+        dna: the face.
+    """
+    out = []
+    for m in finest(dna):
+        name, mesh = dna.mesh_names[m], dna.meshes[m]
+        corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts)]
+        faces = [own.tolist() for own in np.split(corners, mesh.face_offsets[1:-1])]
+        places = np.asarray(mesh.positions, np.float64) @ standing_axes(dna)
+        out.append(HeadPart(name, ObjMesh(places, np.zeros((0, 2)), faces), source=name))
+    return out
 
 
 def _laid(

@@ -12,11 +12,11 @@ import numpy as np
 
 from ... import Dna
 from ...anyhead.conform import Conformed, conform_face
-from ...anyhead.conform.head import mm_of
+from ...anyhead.conform.head import mm_of, parts_of
 from ...anyhead.conform.parts import skin_of
 from ...anyhead.landmarks.marks import landmarks_path, read_landmarks
 from ...anyhead.reading import read_head
-from ...author.heads.parts import Wishes
+from ...author.heads.parts import HeadPart, Wishes
 from ...base.words import counted
 from ...files import fileio
 from ...mixing.mix import Mix
@@ -49,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="HEAD",
         help="give the face that is named, a DNA file, the form of this head (OBJ, glTF, FBX, a "
-        "folder of OBJ files; a sculpt of the face as it is): its names, counts and layers stay",
+        "folder of OBJ files, another DNA file; a sculpt of the face as it is): its names, counts "
+        "and layers stay",
     )
 
 
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
     fileio.check_writable(args.out)
     refuse_same_file(str(args.spec), str(args.out))
     dna = read(str(args.spec), "dna")
-    parts, unit = read_head(args.conform)
+    parts, unit = _head(args.conform)
     marks, known = None, args.landmarks or landmarks_path(args.conform)
     if args.landmarks is not None or known.is_file():
         clock.line(f"landmarks of {known}")
@@ -95,6 +96,14 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
     else:
         print("\n".join([*(f"note: {note}" for note in made.notes), as_line(args.out, dna, made)]))
     return 0
+
+
+def _head(path: Path) -> tuple[list[HeadPart], str]:
+    """The meshes of a head and the unit of its format; another face is a head too."""
+    if path.suffix.lower() != ".dna":
+        return read_head(path)
+    other = read(str(path), "dna")
+    return parts_of(other), other.translation_unit
 
 
 def _check(args: argparse.Namespace) -> None:
