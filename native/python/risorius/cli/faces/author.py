@@ -33,6 +33,7 @@ from ...controls.vocabulary import vocabulary
 from ...files import fileio
 from ..files import CommandLineError, number, require_suffix, whole_number
 from ..pages.authoring import need_plot, report_page
+from . import conform
 from .onto import add_arguments, check_arguments, read_onto, spec_of
 
 _DESCRIPTION = """\
@@ -40,7 +41,8 @@ Finds joints, skin weights and joint motions that repeat the expressions of a fa
 as a DNA file; what joints leave beyond a tolerance stays as blend shapes. HEAD is a glTF or FBX
 file, a folder of OBJ files, or a SPEC.toml that says where the face is (one of these, or a DNA file
 whose expressions are blend shapes) and what the rig is to be: see docs/authoring.md. With --onto
-the head needs no expressions, and HEAD is a DNA file that has them: see docs/anyhead.md."""
+the head needs no expressions, and HEAD is a DNA file that has them; with --conform HEAD is a DNA
+file that takes another head's form: see docs/anyhead.md."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -108,11 +110,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument("--json", action="store_true", help="the errors for a program")
     add_arguments(parser)
+    conform.add_arguments(parser)
     parser.set_defaults(func=run)
 
 
 def run(args: argparse.Namespace) -> int:
     say = _Clock(quiet=args.json)
+    if args.conform is not None:
+        return conform.run(args, say)
     spec = _spec(args)
     _size(spec, args)
     options, asked = _options(spec, args), _correctives(spec, args)
