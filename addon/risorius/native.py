@@ -35,6 +35,8 @@ if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
         Surface,
     )
     from risorius.anim.reactions import Reaction  # noqa: F401
+    from risorius.anyhead.landmarks.marks import Landmarks  # noqa: F401
+    from risorius.anyhead.surface import Surface as HeadSurface  # noqa: F401
     from risorius.author import JointRig  # noqa: F401
     from risorius.author.heads.parts import HeadPart  # noqa: F401
     from risorius.author.input.shape_face import ShapeSet  # noqa: F401
