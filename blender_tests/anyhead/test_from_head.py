@@ -47,9 +47,8 @@ def test_a_head_without_expressions_becomes_a_face(head, onto, dna_file, tmp_pat
     bpy.context.view_layer.update()
     file = {"template": "FILE", "template_file": str(dna_file)}
     assert make(tmp_path / "egg.dna", strength=0.5, use_repair=False, **file) == {"FINISHED"}
-    ((dna, marks, transfer),) = onto.asked
+    ((dna, transfer),) = onto.asked
     assert dna.mesh_names == package_module.load(dna_file).mesh_names
-    assert set(marks.points) == {*PLACES, "chin"}
     assert transfer == (0.5, False)
     (rig,) = rigs()
     wanted = to_blender(0.5 * opened(onto.heads[0].parts[0].mesh.positions))
@@ -73,18 +72,16 @@ def test_the_face_of_the_scene_lends_its_expressions(head, onto, dna_file, tmp_p
     assert onto.asked[0][0] is runtime.there(rig).dna
 
 
-def test_a_missing_landmark_stops_it_and_what_was_found_stays(head, onto, dna_file, tmp_path):
-    del onto.places["chin"]
-    file = {"template": "FILE", "template_file": str(dna_file)}
-    assert make(tmp_path / "egg.dna", **file) == {"FINISHED"}
-    assert set(scene.submodule("scene.anyhead.points").of(head)) == set(PLACES)
-    assert not rigs()
-    assert not onto.asked
-    assert not (tmp_path / "egg.dna").exists()
+def test_landmarks_that_a_person_placed_are_used(head, onto, dna_file, tmp_path):
+    assert risorius.find_landmarks() == {"FINISHED"}
     bpy.context.scene.cursor.location = (0.0, -0.08, -0.1)
     risorius.place_landmark(landmark="chin", way="CURSOR")
+    file = {"template": "FILE", "template_file": str(dna_file)}
     assert make(tmp_path / "egg.dna", **file) == {"FINISHED"}
-    assert len(rigs()) == 1
+    used = onto.heads[-1]
+    assert list(used.fixed) == ["chin"]
+    np.testing.assert_allclose(used.fixed["chin"], [0.0, -10.0, 8.0], atol=1e-4)
+    assert used.named == "Egg"  # who has looked at landmarks has said which mesh is the face
 
 
 def test_what_cannot_be_used_leaves_nothing(head, onto, dna_file, tmp_path, monkeypatch):

@@ -84,16 +84,22 @@ class Onto(Package):
         monkeypatch.setattr(self._making, "_carry_over", self._carry_over)
         monkeypatch.setattr(self._making, "_conform", self._conform)
 
-    def _carry_over(self, head, dna, marks, transfer, progress):
-        self.asked.append((dna, marks, transfer))
+    def _carry_over(self, head, dna, transfer, progress):
+        self.heads.append(head)
+        self.asked.append((dna, transfer))
         assert progress(0.5)
         part = scene.submodule("native").part
-        parts, face = part("author.heads.parts"), head.parts[0]
+        parts, faces = part("author.heads.parts"), part("author.input.shape_face")
+        face = head.parts[0]
         moved = {"jawOpen": transfer.strength * opened(face.mesh.positions)}
         rows = [parts.HeadPart(face.name, face.mesh, moved, source=face.source)]
         joined = part("author.heads.joining").join("Egg", rows, "cm", parts.Wishes(scale=1.0), {})
-        return part("author.input.shape_face").shape_set(face.name, joined)
+        shapes = faces.shape_set(face.name, joined)
+        marks = SimpleNamespace(points={**self.places, **head.fixed}, notes=[])
+        made = SimpleNamespace(shapes=shapes, landmarks=marks)
+        face = faces.make_shape_face(shapes, {"jawOpen": ["jawOpen"]})
+        return made, SimpleNamespace(dna=face, kept=(), odd=[])
 
     def _conform(self, head, dna, _progress):
         self.asked.append((dna, head))
-        return self._making.Conformed(None, dna, ["It fits."])
+        return SimpleNamespace(dna=dna, landmarks=None, notes=["It fits."])

@@ -39,11 +39,13 @@ class Head(NamedTuple):
         parts: the face first, in centimetres with y up, as shape_key_head.part_of gives them.
         turn: float64[3, 3], from the head's own coordinates to these.
         fixed: landmarks that a person moved or placed, in these.
+        named: the object that is the face, where a person says so; "": of several it is guessed.
     """
 
     parts: Sequence[native.HeadPart]
     turn: Doubles
     fixed: Mapping[str, Doubles]
+    named: str
 
 
 def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> Head:
@@ -58,8 +60,9 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
         shape_key_head.part_of(context, item, head, with_keys=False) for item in (head, *others)
     ]
     turn = shape_key_head.turn_of(context, head)
-    fixed = {name: turn @ place for name, place in points.by_hand(points.of(head)).items()}
-    return Head(rows, turn, fixed)
+    there = points.of(head)
+    fixed = {name: turn @ place for name, place in points.by_hand(there).items()}
+    return Head(rows, turn, fixed, head.name if there or not others else "")
 
 
 def words() -> Mapping[str, str]:
@@ -74,21 +77,8 @@ def needed() -> frozenset[str]:
     return found
 
 
-def find(head: Head, progress: Callable[[float], bool]) -> tuple[native.Landmarks, Finding]:
-    """Look for the landmarks of a head, beside those that a person placed.
-
-    Args:
-        head: of `read`.
-        progress: takes the share that is done; False ends the work.
-
-    Returns:
-        risorius.anyhead.landmarks.Landmarks in the head's centimetres, and the same for its object.
-    """
-    found = _search(head, progress)
-    return found, _on_object(head, found)
-
-
 def _search(head: Head, progress: Callable[[float], bool]) -> native.Landmarks:
+    """The landmarks of a head, beside those that a person placed."""
     module = native.part("anyhead.landmarks.find")
     hints = module.Hints(where=head.parts[0].name, marks=dict(head.fixed))
     found: native.Landmarks = module.find_landmarks(surface_of(head.parts[0]), hints)
@@ -96,11 +86,31 @@ def _search(head: Head, progress: Callable[[float], bool]) -> native.Landmarks:
     return found
 
 
-def _on_object(head: Head, found: native.Landmarks) -> Finding:
+def on_object(head: Head, found: native.Landmarks) -> Finding:
+    """Landmarks of the package in the coordinates of the head's object.
+
+    Args:
+        head: of `read`.
+        found: in the head's centimetres.
+    """
     back = np.linalg.inv(head.turn)
     places = {name: back @ np.asarray(point) for name, point in found.points.items()}
     missing = [name for name in words() if name in needed() and name not in places]
     return Finding(places, missing, list(found.notes))
+
+
+def marks_of(head: Head) -> native.Landmarks | None:
+    """What a person said of landmarks, as the package takes it; None: nothing.
+
+    Args:
+        head: of `read`.
+    """
+    if not head.fixed:
+        return None
+    out: native.Landmarks = native.part("anyhead.landmarks.marks").Landmarks()
+    for name, place in head.fixed.items():
+        out.moved(name, place)
+    return out
 
 
 def surface_of(part: native.HeadPart) -> native.HeadSurface:
@@ -115,7 +125,7 @@ def find_task(head: Head) -> Task[Finding]:
     """The finding of landmarks beside Blender. Args: head  of `read`."""
 
     def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Finding:
-        return find(head, telling(progress, cancelled))[1]
+        return on_object(head, _search(head, telling(progress, cancelled)))
 
     return Task(work)
 
@@ -142,4 +152,4 @@ def read_file(head: Head, path: str) -> dict[str, Doubles]:
         OSError: it cannot be read.
     """
     found = native.part("anyhead.landmarks.marks").read_landmarks(path)
-    return dict(_on_object(head, found).places)
+    return dict(on_object(head, found).places)

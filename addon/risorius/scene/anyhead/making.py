@@ -15,26 +15,23 @@ Result = TypeVar("Result")
 Progress = Callable[[float], None]
 Cancelled = Callable[[], bool]
 
-FIND, FIT, JOINTS = "FIND", "FIT", "JOINTS"  # what is done now
-# What of the whole time each takes.
-_SHARES = {FIND: (0.0, 0.1), FIT: (0.1, 0.5), JOINTS: (0.5, 1.0)}
+FIT, JOINTS = "FIT", "JOINTS"  # what is done now
+_FITTED = 0.6  # the share of the whole time at which a head has its expressions
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """Something that takes seconds in several stages. Attributes: stage  FIND, FIT or JOINTS."""
+    """Something that takes seconds in two stages. Attributes: stage  FIT or JOINTS."""
 
-    stage = FIND
+    stage = FIT
 
-    def part(self, stage: str, last: float = 0.0) -> Progress:
+    def part(self, stage: str, begin: float, end: float) -> Progress:
         """A progress for a stage, from its own 0 to 1.
 
         Args:
-            stage: FIND, FIT or JOINTS.
-            last: the share of the whole at its end; 0: as for a rig.
+            stage: FIT or JOINTS.
+            begin, end: shares of the whole.
         """
         self.stage = stage
-        begin, end = _SHARES[stage]
-        end = last or end
 
         def tell(share: float) -> None:
             self.share = begin + (end - begin) * share
@@ -78,13 +75,13 @@ class Made(NamedTuple):
 
     Attributes:
         finding: its landmarks.
-        shapes: what the face was made from; None where landmarks are missing.
-        rigged: the face; None where landmarks are missing.
+        shapes: what the face was made from.
+        rigged: the face.
     """
 
     finding: finding.Finding
-    shapes: native.ShapeSet | None
-    rigged: shape_key_head.Rigged | None
+    shapes: native.ShapeSet
+    rigged: shape_key_head.Rigged
 
 
 def rig_task(
@@ -100,29 +97,35 @@ def rig_task(
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> Made:
-        dna = template.load()
-        marks, found = finding.find(head, telling(task.part(FIND), cancelled))
-        if found.missing:
-            return Made(found, None, None)
-        shapes = _carry_over(head, dna, marks, transfer, telling(task.part(FIT), cancelled))
-        rigged = shape_key_head.make_rig(shapes, wishes, None, task.part(JOINTS), cancelled)
-        return Made(found, shapes, rigged)
+        tell = telling(task.part(FIT, 0.0, _FITTED), cancelled)
+        made, read = _carry_over(head, template.load(), transfer, tell)
+        tell = telling(task.part(JOINTS, _FITTED, 1.0), cancelled)
+        rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell)
+        if not cancelled():
+            rig.dna.save(wishes.path)
+        found = finding.on_object(head, made.landmarks)
+        return Made(found, made.shapes, shape_key_head.Rigged(rig, read.odd))
 
     task = HeadTask(work)
     return task
 
 
 def _carry_over(
-    head: finding.Head,
-    dna: native.Dna,
-    marks: native.Landmarks,
-    transfer: Transfer,
-    progress: Callable[[float], bool],
-) -> native.ShapeSet:
-    onto = native.part("anyhead.onto")
-    options = onto.OntoOptions(strength=transfer.strength, repair=transfer.repair)
-    shapes: native.ShapeSet = onto.onto(head.parts, dna, marks, options, progress)
-    return shapes
+    head: finding.Head, dna: native.Dna, transfer: Transfer, progress: Callable[[float], bool]
+) -> tuple[native.Onto, native.Read]:
+    """The head with the expressions of a face, and the face of blend shapes of it."""
+    onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
+    options = onto.OntoOptions(
+        strength=transfer.strength,
+        repaired=transfer.repair,
+        marks=finding.marks_of(head),
+        # An object has the size that it has: a face that is made smaller would not fit its body.
+        wishes=parts.Wishes(mesh=head.named, scale=1.0),
+    )
+    name = head.parts[0].name
+    made: native.Onto = onto.onto(name, head.parts, "cm", dna, options, progress)
+    made.shapes.name = name
+    return made, onto.shape_face(made, dna, name)
 
 
 class Conformed(NamedTuple):
@@ -130,12 +133,10 @@ class Conformed(NamedTuple):
 
     Attributes:
         finding: the landmarks of the head; None where it has the face's own topology.
-        dna: the face in its new form; None where landmarks are missing.
         notes: sentences.
     """
 
     finding: finding.Finding | None
-    dna: native.Dna | None
     notes: list[str]
 
 
@@ -149,21 +150,21 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> Conformed:
-        made = _conform(head, template.load(), telling(task.part(FIT, 1.0), cancelled))
-        if made.dna is not None and not cancelled():
+        tell = telling(task.part(FIT, 0.0, 1.0), cancelled)
+        made = _conform(head, template.load(), tell)
+        if not cancelled():
             made.dna.save(path)
-        return made
+        marks = made.landmarks
+        found = finding.on_object(head, marks) if marks is not None else None
+        return Conformed(found, list(made.notes))
 
     task = HeadTask(work)
     return task
 
 
-def _conform(head: finding.Head, dna: native.Dna, progress: Callable[[float], bool]) -> Conformed:
-    module = native.part("anyhead.conform")
-    found, marks = None, None
-    if not module.is_same_topology(dna, head.parts[0].mesh):
-        marks, found = finding.find(head, progress)
-        if found.missing:
-            return Conformed(found, None, [])
-    made = module.conform_face(dna, head.parts, marks, progress)
-    return Conformed(found, made.dna, list(made.notes))
+def _conform(
+    head: finding.Head, dna: native.Dna, progress: Callable[[float], bool]
+) -> native.Conformed:
+    module = native.part("anyhead.conform.head")
+    made: native.Conformed = module.conform_face(dna, head.parts, finding.marks_of(head), progress)
+    return made

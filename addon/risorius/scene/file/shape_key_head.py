@@ -250,21 +250,13 @@ def make_rig(
         shapes, wishes, said: as for rig_task.
         progress, cancelled: of a task's work; a cancelled one writes no file.
     """
-    author = native.part("author")
     face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
     library = native.part("author.input.library")
     odd = face.check_shapes(shapes)
     became = matching.assign(shapes.expressions, said or {})
     odd += became.notes
     dna = face.make_shape_face(shapes, became.controls)
-    options = author.RigOptions(
-        author.FitOptions(joints=wishes.joints),
-        wishes.tolerance_mm,
-        shapes=wishes.keep,
-        lods=author.LodOptions(count=wishes.levels),
-        kept=shapes.kept,
-    )
-    rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
+    rig = joint_rig(dna, wishes, shapes.kept, telling(progress, cancelled))
     if not cancelled():
         rig.dna.save(wishes.path)
         if became.expressions:
@@ -272,6 +264,29 @@ def make_rig(
             native.part("files.fileio").write_all(library.library_files(became, folder))
             odd.extend(library.about_library(became, folder))
     return Rigged(rig, odd)
+
+
+def joint_rig(
+    dna: native.Dna, wishes: RigWishes, kept: Sequence[str], progress: Callable[[float], bool]
+) -> native.JointRig:
+    """Joints for a face of blend shapes.
+
+    Args:
+        dna: the face.
+        wishes: what the rig is to be.
+        kept: beginnings of the names of meshes that stay as they hang.
+        progress: takes the share that is done; False ends the work.
+    """
+    author = native.part("author")
+    options = author.RigOptions(
+        author.FitOptions(joints=wishes.joints),
+        wishes.tolerance_mm,
+        shapes=wishes.keep,
+        lods=author.LodOptions(count=wishes.levels),
+        kept=tuple(kept),
+    )
+    rig: native.JointRig = author.make_joint_rig(dna, options, progress)
+    return rig
 
 
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:

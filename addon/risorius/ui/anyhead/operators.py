@@ -12,7 +12,7 @@ import bpy
 from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
-from ...scene.anyhead import finding, heads, making
+from ...scene.anyhead import finding, heads, making, points
 from ...scene.base import parts
 from ...scene.base.blender_types import MeshObject
 from ...scene.character import build, rig_placement, runtime
@@ -24,7 +24,7 @@ from ..blender_types import Context, ExportHelper, Menu, Operator, Result
 from ..common import explain, proposed_file, system_path
 from ..file.import_operators import import_character
 from ..file.rig_operators import MadeFace, show_made
-from .landmark_operators import OfHead, head_there, show_found
+from .landmark_operators import OfHead, head_there
 
 TEMPLATES = [
     ("SAMPLE", "Sample Man", "The man who came with Risorius"),
@@ -32,7 +32,6 @@ TEMPLATES = [
     ("FILE", "DNA File", "Any face with expressions"),
 ]
 _STAGES = {
-    making.FIND: words.mark("Finding landmarks: {share} %, Esc cancels"),
     making.FIT: words.mark("Fitting the face to the head: {share} %, Esc cancels"),
     making.JOINTS: words.mark("Finding joints: {share} %, Esc cancels"),
 }
@@ -95,11 +94,8 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
             self.report({"ERROR"}, words.say("{name} is gone.", name=self._head))
             return {"CANCELLED"}
         made = cast("making.Made | making.Conformed", task.result)
-        found = made.finding
-        if found is not None:
-            show_found(self, context, head, found)
-            if found.missing:
-                return {"FINISHED"}  # what was found stays, to be completed by hand
+        if made.finding is not None:
+            points.show(context, head, made.finding.places)
         return self._show(context, head, made)
 
     def _said(self, error: Exception) -> str:
@@ -176,11 +172,9 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
     def _show(
         self, context: Context, head: MeshObject, made: making.Made | making.Conformed
     ) -> Result:
-        shapes, rigged = cast("making.Made", made)[1:]
-        assert shapes is not None  # no landmark is missing
-        assert rigged is not None
-        face = MadeFace(head.name, shapes, *rigged)
-        return show_made(self, context, self.filepath, face)
+        made = cast("making.Made", made)
+        face = MadeFace(head.name, made.shapes, *made.rigged)
+        return show_made(self, context, self.filepath, face, with_materials=True)
 
     def draw(self, context: Context) -> None:
         layout = self.layout

@@ -193,11 +193,14 @@ def show_made(
     Returns:
         What `execute` returns.
     """
-    before = set(bpy.data.objects)
+    before, materials = set(bpy.data.objects), set(bpy.data.materials)
     options = build.BuildOptions(materials=with_materials)
     if import_character(operator, context, path, options) != {"FINISHED"}:
         return {"CANCELLED"}
     _take_place(context, made, before)
+    for material in set(bpy.data.materials) - materials:
+        if not material.users:  # the head lent its own
+            bpy.data.materials.remove(material)
     for sentence in made.shapes.notes:
         operator.report({"INFO"}, sentence)
     for sentence in made.odd[:5]:
