@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Heads without expressions, of people that no rig was made of: what docs/anyhead.md begins with.
 
-any_heads.py FOLDER    writes scan.obj, stylised.obj and avatar.glb; needs bpy and the data of the
-                       sample people
+any_heads.py FOLDER    writes scan.obj, stylised.obj and avatar.glb, and voice.wav with its sounds
+                       said.tsv; needs bpy and the data of the sample people
 
 scan.obj has noise and holes, as a scanner leaves them; stylised.obj large eyes, a small jaw and few
 polygons; avatar.glb a head, two eyes and teeth as meshes of their own. All were remeshed: no vertex
@@ -12,6 +12,7 @@ of these heads is one of a sample person.
 from __future__ import annotations
 
 import sys
+import wave
 from dataclasses import replace
 from pathlib import Path
 
@@ -149,9 +150,22 @@ def write_obj(path: Path, points: Doubles, faces: Faces) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def write_voice(folder: Path) -> None:
+    """A hum of a second and a half, and the sounds of the word that it stands for."""
+    sounds = ("sil", "HH", "AH", "L", "OW", "M", "AA", "M", "AA", "sil")
+    rows = [f"{0.15 * n:.2f}\t{0.15 * (n + 1):.2f}\t{sound}\t1\t" for n, sound in enumerate(sounds)]
+    text = "\n".join(["begin\tend\tphoneme\tconfidence\tword", *rows]) + "\n"
+    (folder / "said.tsv").write_text(text, encoding="utf-8")
+    tone = 6000 * np.sin(2 * np.pi * 150 * np.arange(24_000) / 16_000)
+    with wave.open(str(folder / "voice.wav"), "wb") as file:
+        file.setparams((1, 2, 16_000, 0, "NONE", ""))
+        file.writeframes(tone.astype("<i2").tobytes())
+
+
 def write_all(folder: Path) -> None:
     """All three heads. Args: folder  it is made if it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
+    write_voice(folder)
     source = Source(fetch(offline=True))
     write_obj(folder / "scan.obj", *scan(*meshes_of(SCANNED, source)[HEAD]))
     write_obj(folder / "stylised.obj", *drawn(meshes_of(DRAWN, source)))
