@@ -102,4 +102,4 @@ class Onto(Package):
 
     def _conform(self, head, dna, _progress):
         self.asked.append((dna, head))
-        return SimpleNamespace(dna=dna, landmarks=None, notes=["It fits."])
+        return SimpleNamespace(dna=dna, notes=["It fits."])

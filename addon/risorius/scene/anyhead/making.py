@@ -128,35 +128,24 @@ def _carry_over(
     return made, onto.shape_face(made, dna, name)
 
 
-class Conformed(NamedTuple):
-    """What became of a face.
-
-    Attributes:
-        finding: the landmarks of the head; None where it has the face's own topology.
-        notes: sentences.
-    """
-
-    finding: finding.Finding | None
-    notes: list[str]
-
-
-def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[Conformed]:
+def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[list[str]]:
     """A face takes a head's form and is written; a cancelled one leaves no file.
 
     Args:
         head: of finding.read, or a sculpt of the face with its own vertices.
         template: keeps its topology, names and counts.
         path: of the new file.
+
+    Returns:
+        A task whose result is what was guessed and done, a sentence each.
     """
 
-    def work(_progress: Progress, cancelled: Cancelled) -> Conformed:
+    def work(_progress: Progress, cancelled: Cancelled) -> list[str]:
         tell = telling(task.part(FIT, 0.0, 1.0), cancelled)
         made = _conform(head, template.load(), tell)
         if not cancelled():
             made.dna.save(path)
-        marks = made.landmarks
-        found = finding.on_object(head, marks) if marks is not None else None
-        return Conformed(found, list(made.notes))
+        return list(made.notes)
 
     task = HeadTask(work)
     return task
@@ -165,6 +154,13 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 def _conform(
     head: finding.Head, dna: native.Dna, progress: Callable[[float], bool]
 ) -> native.Conformed:
-    module = native.part("anyhead.conform.head")
-    made: native.Conformed = module.conform_face(dna, head.parts, finding.marks_of(head), progress)
+    module, parts = native.part("anyhead.conform.head"), native.part("author.heads.parts")
+    made: native.Conformed = module.conform_face(
+        dna,
+        head.parts,
+        finding.marks_of(head),
+        progress,
+        where=head.parts[0].name,
+        wishes=parts.Wishes(mesh=head.named),
+    )
     return made

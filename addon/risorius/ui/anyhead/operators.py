@@ -15,9 +15,8 @@ from ...logic.base.sentences import told
 from ...scene.anyhead import finding, heads, making, points
 from ...scene.base import parts
 from ...scene.base.blender_types import MeshObject
-from ...scene.character import build, rig_placement, runtime
+from ...scene.character import build, runtime
 from ...scene.file import shape_key_head
-from ...scene.frame import evaluate
 from .. import words
 from ..background_work import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
@@ -71,17 +70,15 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self.begin(context, task)
 
     def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
-        """The work. Args: context, head  of finding.read."""
+        """The work."""
         raise NotImplementedError
 
-    def _show(
-        self, context: Context, head: MeshObject, made: making.Made | making.Conformed
-    ) -> Result:
-        """Import what was written. Args: context; head  it is there still; made  of the task."""
+    def _show(self, context: Context) -> Result:
+        """Import what was written."""
         raise NotImplementedError
 
     def finish(self, context: Context) -> Result:
-        """Show the landmarks that were found, and the face where none is missing."""
+        """Show the face that was made."""
         task = self._task
         try:
             if task.result is None:
@@ -89,14 +86,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         except native.user_errors() as error:
             self.report({"ERROR"}, self._said(error))
             return {"CANCELLED"}
-        head = cast("MeshObject | None", bpy.data.objects.get(self._head))
-        if head is None:
-            self.report({"ERROR"}, words.say("{name} is gone.", name=self._head))
-            return {"CANCELLED"}
-        made = cast("making.Made | making.Conformed", task.result)
-        if made.finding is not None:
-            points.show(context, head, made.finding.places)
-        return self._show(context, head, made)
+        return self._show(context)
 
     def _said(self, error: Exception) -> str:
         """A sentence; those of the head and of the other face name these themselves."""
@@ -128,7 +118,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         description="How strong expressions are: 1 as on the other face",
         default=1.0,
         min=0.0,
-        max=2.0,
+        max=1.5,
         subtype="FACTOR",
     )
     use_repair: bpy.props.BoolProperty(
@@ -169,11 +159,12 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
             raise FaceError(told("This package has no sample face: choose a DNA file."))
         return making.Template(path=str(path))
 
-    def _show(
-        self, context: Context, head: MeshObject, made: making.Made | making.Conformed
-    ) -> Result:
-        made = cast("making.Made", made)
-        face = MadeFace(head.name, made.shapes, *made.rigged)
+    def _show(self, context: Context) -> Result:
+        made = cast("making.Made", self._task.result)
+        head = bpy.data.objects.get(self._head)
+        if head is not None and head.type == "MESH":
+            points.show(context, cast(MeshObject, head), made.finding.places)
+        face = MadeFace(self._head, made.shapes, *made.rigged)
         return show_made(self, context, self.filepath, face, with_materials=True)
 
     def draw(self, context: Context) -> None:
@@ -209,20 +200,12 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
         rig = heads.face_there(context)
         return making.conform_task(head, making.Template(runtime.there(rig).dna), self.filepath)
 
-    def _show(
-        self, context: Context, head: MeshObject, made: making.Made | making.Conformed
-    ) -> Result:
-        before = set(bpy.data.objects)
-        if import_character(self, context, self.filepath, build.BuildOptions()) != {"FINISHED"}:
-            return {"CANCELLED"}
-        rig = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
-        if rig is not None:
-            rig_placement.put_beside_mesh(rig, head)
-            rig_placement.put_beside(context.scene, rig)
-            evaluate.bring_up(context, rig)
-        for sentence in cast("making.Conformed", made).notes[:5]:
+    def _show(self, context: Context) -> Result:
+        notes = cast("list[str]", self._task.result)
+        done = import_character(self, context, self.filepath, build.BuildOptions(), show=True)
+        for sentence in notes[:5]:
             self.report({"INFO"}, sentence)
-        return {"FINISHED"}
+        return done
 
     def draw(self, context: Context) -> None:
         layout = self.layout
