@@ -42,11 +42,13 @@ def moved_by(rig, control):
     return out
 
 
-def test_a_head_without_expressions_becomes_a_face(head, onto, dna_file, tmp_path):
+def test_a_head_without_expressions_becomes_a_face(head, onto, dna_file, tmp_path, capfd):
     head.location = (2.0, 1.0, 0.5)
     bpy.context.view_layer.update()
     file = {"template": "FILE", "template_file": str(dna_file)}
     assert make(tmp_path / "egg.dna", strength=0.5, use_repair=False, **file) == {"FINISHED"}
+    said = capfd.readouterr().out
+    assert said.count("It stands.") == said.count("It is odd.") == 1
     ((dna, transfer),) = onto.asked
     assert dna.mesh_names == package_module.load(dna_file).mesh_names
     assert transfer == (0.5, False)

@@ -96,9 +96,9 @@ class Onto(Package):
         joined = part("author.heads.joining").join("Egg", rows, "cm", parts.Wishes(scale=1.0), {})
         shapes = faces.shape_set(face.name, joined)
         marks = SimpleNamespace(points={**self.places, **head.fixed}, notes=[])
-        made = SimpleNamespace(shapes=shapes, landmarks=marks)
+        made = SimpleNamespace(shapes=shapes, landmarks=marks, notes=["It stands."])
         face = faces.make_shape_face(shapes, {"jawOpen": ["jawOpen"]})
-        return made, SimpleNamespace(dna=face, kept=(), odd=[])
+        return made, SimpleNamespace(dna=face, kept=(), odd=["It stands.", "It is odd."])
 
     def _conform(self, head, dna, _progress):
         self.asked.append((dna, head))

@@ -104,7 +104,9 @@ def rig_task(
         if not cancelled():
             rig.dna.save(wishes.path)
         found = finding.on_object(head, made.landmarks)
-        return Made(found, made.shapes, shape_key_head.Rigged(rig, read.odd))
+        made.shapes.notes = list(dict.fromkeys(made.notes))
+        odd = [sentence for sentence in read.odd if sentence not in made.notes]
+        return Made(found, made.shapes, shape_key_head.Rigged(rig, odd))
 
     task = HeadTask(work)
     return task
