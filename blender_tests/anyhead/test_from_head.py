@@ -135,3 +135,7 @@ def test_a_face_takes_the_form_of_a_head(head, onto, dna_file, tmp_path):
     assert dna is scene.submodule("scene.character.runtime").there(rig).dna
     assert len(read.parts[0].mesh.positions) == 506
     assert (tmp_path / "new.dna").is_file()
+    bpy.context.view_layer.objects.active = head
+    scene.controls(rig).select_set(True)
+    with pytest.raises(RuntimeError, match="the face's own file"):
+        risorius.conform_face(filepath=str(dna_file))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Generic, NamedTuple, TypeVar
 
 from ... import native
@@ -44,7 +45,7 @@ class Template(NamedTuple):
 
     Attributes:
         dna: of a face of the scene; None: the file's.
-        path: of the file; "": none.
+        path: of the file; of a face of the scene the file that it came from; "": none.
     """
 
     dna: native.Dna | None = None
@@ -143,14 +144,31 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> list[str]:
-        tell = telling(task.part(FIT, 0.0, 1.0), cancelled)
-        made = _conform(head, template.load(), tell)
+        dna = template.load()
+        made = _conform(head, dna, telling(task.part(FIT, 0.0, 1.0), cancelled))
+        files = {Path(path): made.dna.to_bytes(), **_textures(dna, template.path, path)}
         if not cancelled():
-            made.dna.save(path)
+            native.part("files.fileio").write_all(files)
         return list(made.notes)
 
     task = HeadTask(work)
     return task
+
+
+def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
+    """The textures beside a face's file, for beside the new one.
+
+    Args:
+        dna: the face.
+        source: its file, which may be gone; "": none.
+        path: of the new file.
+    """
+    if not source or not Path(source).is_file():
+        return {}
+    mixing, textures = native.part("mixing"), native.part("mixing.textures")
+    found, _ = textures.mix_textures([dna], [Path(source)], mixing.Mix([1.0]), mixing.Masks(dna))
+    folder = textures.texture_folder(Path(path))
+    return {folder / name: picture for name, picture in found.items()}
 
 
 def _conform(

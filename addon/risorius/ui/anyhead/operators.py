@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import cast
 
 import bpy
@@ -13,7 +14,7 @@ from ... import native
 from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...scene.anyhead import finding, heads, making, points
-from ...scene.base import parts
+from ...scene.base import parts, saved
 from ...scene.base.blender_types import MeshObject
 from ...scene.character import build, runtime
 from ...scene.file import shape_key_head
@@ -198,7 +199,11 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
     def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
         rig = heads.face_there(context)
-        return making.conform_task(head, making.Template(runtime.there(rig).dna), self.filepath)
+        source = bpy.path.abspath(saved.text(rig, parts.SOURCE))
+        if source and Path(source).resolve() == Path(self.filepath).resolve():
+            raise FaceError(told("This is the face's own file: choose another name."))
+        template = making.Template(runtime.there(rig).dna, source)
+        return making.conform_task(head, template, self.filepath)
 
     def _show(self, context: Context) -> Result:
         notes = cast("list[str]", self._task.result)
