@@ -205,7 +205,7 @@ def test_what_cannot_be_used_leaves_nothing(head, tmp_path):
 def test_a_cancelled_rig_leaves_no_file(head, tmp_path):
     heads = scene.submodule("scene.file.shape_key_head")
     shapes = heads.shapes_of(bpy.context, head)
-    task = heads.rig_task(shapes, str(tmp_path / "a.dna"), 40, 8, 0.1)
+    task = heads.rig_task(shapes, heads.RigWishes(str(tmp_path / "a.dna"), 40, 8, 0.1))
     task.start()
     task.cancel()
     assert not task.is_running()

@@ -154,6 +154,8 @@ OTHERS = {
     "drivers; each side shows what it showed": "link_sides",
     "what is shown, and why": "frame_board frame_face heat hide_hints hide_joints hide_outlines "
     "mask_renders move_outlines mute set_strands show_all solo why_vertex",
+    "landmarks of a head, and faces that are made of it": "find_landmarks place_landmark "
+    "clear_landmarks landmark_names save_landmarks load_landmarks make_rig_from_head conform_face",
     "names of shape keys and of curves": "assign_curve assign_shape_key choose_curve "
     "choose_shape_key load_shape_key_names save_curve_mapping save_shape_key_names "
     "select_shape_key shape_key_pictures",

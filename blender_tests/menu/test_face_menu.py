@@ -27,6 +27,7 @@ ELSEWHERE = {
         "load_shape_key_names",
         "save_shape_key_names",
     ),
+    *("place_landmark", "clear_landmarks", "landmark_names", "save_landmarks", "load_landmarks"),
     *("lead", "remove_board", "frame_board", "sound_set", "sound_insert", "sound_remove"),
 }
 

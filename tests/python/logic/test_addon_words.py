@@ -170,6 +170,11 @@ def titles_of_the_package() -> Found:
         for row in table.get("expressions", table).values():
             if isinstance(row, dict) and "label" in row:
                 found["Risorius", row["label"]] = path.name
+    path = PACKAGE / "anyhead" / "landmarks" / "names.toml"
+    for name, row in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        found["Risorius", row["words"]] = path.name
+        if name.endswith("_L"):
+            found["Risorius", row["words"].replace(" left ", " right ")] = path.name
     table = tomllib.loads((PACKAGE / "live" / "sources.toml").read_text(encoding="utf-8"))
     found |= {("*", row["description"]): "sources.toml" for row in table.values()}
     return found

@@ -72,6 +72,7 @@ def _draw_start(layout: UILayout) -> None:
     _draw_step(layout, words.say("1. Get a face"))
     layout.operator("risorius.add_character", text="Add a Face", icon="USER")
     layout.operator("risorius.import_dna", text="Import DNA", icon="IMPORT")
+    layout.operator("risorius.make_rig_from_head", icon="MESH_MONKEY")
     _draw_step(layout, words.say("2. Move it"))
     words.write(layout, "Sliders, expressions and bones come with the face.")
     layout.operator("risorius.key", text="Key All", icon="KEYFRAME_HLT").region = ""
