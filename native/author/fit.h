@@ -33,8 +33,9 @@ struct GivenJoint {
   static constexpr std::uint32_t kUnknown = 0xffffffffu;
 };
 
-/// A point that what some expressions move turns about: an eye for its lids, a jaw's hinge. Joints
-/// that move mostly in these are placed there, so that on the way to 1 they go along the arc.
+/// A point about which the vertices of some expressions turn, such as the centre of an eye for its
+/// lids or the hinge of a jaw. A joint that moves mostly in these expressions is placed there,
+/// because its vertices then follow an arc between 0 and 1.
 struct Pivot {
   Vector3 position{};
   std::vector<std::uint32_t> expressions;

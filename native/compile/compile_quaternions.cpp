@@ -133,7 +133,8 @@ std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
     if (first[c] != rig::kNone) order.push_back(c);
   }
   std::size_t live = order.size();  // values at every LOD so far
-  std::uint32_t rows = UINT32_MAX;  // a LOD of as many rows finds no other column empty
+  // the smallest row count so far; a LOD with at least as many rows leaves the order unchanged
+  std::uint32_t rows = UINT32_MAX;
   for (std::size_t l = 0; l < lod_count && l < g.lods.size(); ++l) {
     if (g.lods[l] >= rows) continue;
     rows = g.lods[l];

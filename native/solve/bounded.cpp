@@ -122,8 +122,8 @@ struct Descent {
     }
     return largest;
   }
-  /// All coordinates between their bounds and on one side of rest at once, as far as all stay
-  /// there.
+  /// A Newton step in the free coordinates: those strictly between their bounds and not at rest.
+  /// The step is shortened so that no coordinate crosses a bound or its rest.
   void newton() {
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < q.count; ++i) {

@@ -13,7 +13,8 @@ namespace risorius::author::detail {
 
 namespace {
 
-constexpr std::size_t kFades = 9, kSteps = 6;  // a part is undone in so many
+// numbers of steps in which a part of the pose is faded out
+constexpr std::size_t kFades = 9, kSteps = 6;
 constexpr double kUndone = 2.0;  // what all undone motion costs; all faults of a kind cost 1
 // A cost at which nothing else is tried. Any fault that is left costs as much beside its share.
 constexpr double kEnough = 0.15;
@@ -187,7 +188,8 @@ void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   }
 }
 
-/// The displacement that all that is asked agrees on, as smooth as can be.
+/// Solves one sparse linear system: the smoothest displacement that meets the goals of places,
+/// edges and flatness in the least squares sense.
 void solve(Work& work, const std::vector<Vec3>& base) {
   const Topology& topology = work.topology;
   const auto count = static_cast<Eigen::Index>(work.active.size());

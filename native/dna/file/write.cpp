@@ -168,7 +168,8 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
   }
 }
 
-// What the file will hold. Nothing when that is everything.
+// The face without the layers and controls that this version cannot store, or nullopt if the whole
+// face can be stored.
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
   const std::vector<std::string> lost =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stage that most of the time goes to: joint attributes as sums of the columns of active
+// The stage that takes most of the time: joint attributes as sums of the columns of active
 // controls.
 #include <algorithm>
 #include <bit>
@@ -15,7 +15,8 @@ namespace {
 constexpr std::uint64_t kListed =
     sizeof(JointColumn) + 2 * sizeof(std::uint32_t) + 2 * sizeof(simd::Column);
 
-// What the active controls have in the joint groups, as far as anything asks.
+// The columns and values of the joint groups that the active controls read. Only `columns` is
+// counted if the rig keeps no table of reads.
 ControlReads count_active(const Rig& rig, std::uint32_t lod,
                           std::span<const std::uint16_t> active) noexcept {
   ControlReads sum;

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            "interrupted; what is done is kept, the same command goes on"
+            "interrupted: finished files are kept, and the same command goes on from here"
         ) from None
     return tell(report, as_json=args.json)
 

@@ -32,7 +32,7 @@ _TOGETHER = (
     ("eyeCheekRaise", "eyeLookUp"),
     ("eyeSquintInner", "eyeLookDown"),
 )
-# What closed lids do not do beside it: they stay closed.
+# Expressions that do not move the lids of a closed eye.
 _NOT_CLOSED = [
     *(f"eyeLook{way}" for way in LOOKS),
     "eyeSquintInner",
