@@ -405,7 +405,7 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 
 // ---- networks that move joints
 
-// Their numbers stay; keys 3 to 9 name the system that they are meant in.
+// The numbers stay; keys 3 to 9 name the coordinate system that they refer to.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;
@@ -461,7 +461,7 @@ void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
 }
 
 void set_system(const System& target, Dna& dna) {
-  // Only 2.8 has room for all of dsce.
+  // Only version 2.8 stores all fields of dsce.
   if (dna.descriptor_ext != target.ext && dna.version < 8) dna.version = 8;
   dna.descriptor.coordinate_system = target.axes;
   dna.descriptor.translation_unit = target.translation_unit;
