@@ -102,7 +102,7 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """A curve of one control. Args: curve  float64[frames]; rate  frames a second."""
+    """A curve of one control. Args: curve  float64[frames]; rate  frames per second."""
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)

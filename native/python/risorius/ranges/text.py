@@ -70,7 +70,7 @@ def parse_ranges(text: str, where: str) -> Ranges:
 
     Args:
         text: TOML.
-        where: what errors call it.
+        where: its name in errors.
 
     Raises:
         AnimationFileError: as load_ranges.

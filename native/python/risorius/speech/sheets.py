@@ -100,7 +100,7 @@ def read(data: bytes, name: str) -> list[Phoneme]:
 
     Args:
         data: of the file, UTF-8 or UTF-16 with its mark.
-        name: what errors call the file.
+        name: the file's name in errors.
 
     Raises:
         SheetError: another form, times that do not ascend, a phoneme that nobody knows.
