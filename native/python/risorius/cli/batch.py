@@ -70,12 +70,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
-    """Print the jobs, and which of them are done; 0, the exit code.
+    """Print the jobs, and mark the finished ones. Returns the exit code 0.
 
     Args:
         plan: all jobs.
-        restart: none counts as done.
-        as_json: for programs.
+        restart: treat no job as done.
+        as_json: print JSON.
     """
     report, journal = Report(plan), Journal(plan.journal)
     if not restart:
@@ -102,11 +102,11 @@ def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
 
 
 def tell(report: Report, *, as_json: bool) -> int:
-    """Print what became of a batch; the exit code, 1 where a job failed.
+    """Print the results of a batch. Returns the exit code, 1 if a job failed.
 
     Args:
-        report: of the batch.
-        as_json: for programs.
+        report: report of the batch.
+        as_json: print JSON.
     """
     failed = report.failed()
     if as_json:
@@ -125,7 +125,7 @@ def tell(report: Report, *, as_json: bool) -> int:
 
 @contextlib.contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """A polite kill stops a batch as cleanly as Ctrl-C does."""
+    """SIGTERM stops a batch as cleanly as Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

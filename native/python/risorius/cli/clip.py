@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius clip: animation of other software, converted, looked at, mapped."""
+"""risorius clip: convert, inspect and map animation of other software."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_meaning(parser: argparse.ArgumentParser) -> None:
-    """Options that say how the values of IN are understood."""
+    """Add the options that interpret the values of IN."""
     parser.add_argument("--mapping", metavar="M", help=_MAPPING)
     parser.add_argument(
         "--rig", type=Path, metavar="DNA", help="keep only what this rig has; its GUI table"
@@ -86,7 +86,7 @@ def _add_meaning(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_steps(parser: argparse.ArgumentParser) -> None:
-    """Options that change the clip, in the order in which they do, and the report."""
+    """Add the options that change the clip, in the order of their effect, and the report."""
     parser.add_argument(
         "--neutral", metavar="A[:B]", help="frame or frames of a neutral face, which become 0"
     )
@@ -175,7 +175,7 @@ def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def load(args: argparse.Namespace) -> importing.Imported:
-    """What IN holds; a clip of Risorius is of raw controls already."""
+    """Read IN; a clip of Risorius already has raw controls."""
     if args.input.suffix.lower() == ".rzc":
         return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
     return importing.read(
@@ -225,10 +225,10 @@ def run_convert(args: argparse.Namespace) -> int:
 
 
 def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
-    """What is to be done after the mapping, in order.
+    """The steps after the mapping, in order.
 
     Raises:
-        CommandLineError: an option of another form.
+        CommandLineError: an option has an invalid value.
     """
     steps: list[Callable[[Clip], Clip]] = []
     try:
@@ -286,7 +286,7 @@ def _pair(text: str, option: str, number: Callable[[str, int], float]) -> tuple[
 
 
 def _save(clip: Clip, path: Path) -> None:
-    """By the suffix."""
+    """Save in the format of the suffix."""
     suffix = path.suffix.lower()
     if suffix == ".rzc":
         clip.save(path)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""risorius edit: a DNA file made into another one. regroup: its joint groups made anew. lighten:
-fewer joints, correctives and levels of detail."""
+"""risorius edit: change a DNA file. regroup: rebuild its joint groups. lighten: fewer joints,
+correctives and LODs."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ motions. Joints leave that others can stand for; weights are fitted anew over al
 Correctives leave that move vertices least. Prints sizes, the time of an evaluation, and how far
 each expression is off; --report writes all expressions. See docs/authoring.md."""
 _REPORTS = (".json", ".csv")
-_WORST = 20  # expressions that are printed
+_WORST = 20  # number of expressions to print
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -144,10 +144,10 @@ def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """One number, or three.
+    """Parse one number, or three.
 
     Raises:
-        CommandLineError: a text of another form.
+        CommandLineError: not one or three numbers.
     """
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -161,7 +161,7 @@ def parse_threshold(text: str) -> float | list[float]:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before the file is looked at."""
+    """Raises CommandLineError for wrong options, before the file is opened."""
     if args.plot is not None and Path(args.plot).suffix.lower() not in _PLOTS:
         raise CommandLineError(
             f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"
@@ -172,11 +172,11 @@ def complain(args: argparse.Namespace) -> None:
 
 
 def read_regions(name: str) -> edit.Regions:
-    """Joint names or indices of each region, from {"eye": ["FACIAL_L_Eye", ...], ...}, also below
-    a lone key "regions", or without names [["FACIAL_L_Eye", ...], ...].
+    """Joint names or indices of each region: {"eye": ["FACIAL_L_Eye", ...], ...}, the same below a
+    single key "regions", or without names [["FACIAL_L_Eye", ...], ...].
 
     Raises:
-        InputError: not JSON or TOML, or of another form.
+        InputError: not JSON or TOML, or another structure.
     """
     data = read_bytes(name, TEXT)
     try:
@@ -184,7 +184,7 @@ def read_regions(name: str) -> edit.Regions:
         found = toml.parse(text) if name.lower().endswith(".toml") else json.loads(text)
     except RecursionError as error:
         raise InputError(f"{label(name)}: not JSON that can be read: nested too deeply") from error
-    except ValueError as error:  # of UTF-8, JSON or TOML
+    except ValueError as error:  # from UTF-8, JSON or TOML
         raise InputError(f"{label(name)}: {error}") from error
     if isinstance(found, dict) and list(found) == ["regions"]:
         found = found["regions"]
@@ -204,10 +204,10 @@ def _sizes(sizes: edit.GroupSizes) -> dict[str, int]:
 
 
 def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
-    """Everything that the command prints, as plain values.
+    """All results of the command as plain values.
 
     Args:
-        report: of the regrouping.
+        report: report of the regrouping.
         dna: the face, for the names of its joints.
     """
     changes = {
@@ -228,7 +228,7 @@ def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The facts for a person."""
+    """The results as text."""
     out = [f"{'':<22}{'before':>12}{'after':>12}"]
     titles = {"groups": "joint groups", "rows": "rows", "coefficients": "coefficients stored",
               "nonzero": "coefficients not 0"}  # fmt: skip
@@ -253,10 +253,10 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def _plot(args: argparse.Namespace, before: risorius.Dna, after: bytes) -> None:
-    """Writes the picture.
+    """Write the plot.
 
     Raises:
-        InputError: no Matplotlib, or the file cannot be written.
+        InputError: Matplotlib is missing, or the file cannot be written.
     """
     from ..plot import before_after
     from ..plot.content.facts import gather
@@ -355,11 +355,11 @@ def run_lighten(args: argparse.Namespace) -> int:
 
 
 def report_file(report: LightenReport, name: str) -> bytes:
-    """All expressions as a file.
+    """The report on all expressions as a file.
 
     Args:
-        report: of lighten.
-        name: of the file: .csv has a row for each expression, .json all else too.
+        report: report of lighten.
+        name: name of the file: .csv has a row per expression, .json also the rest.
     """
     if not name.lower().endswith(".csv"):
         return (json.dumps(asdict(report), indent=2) + "\n").encode()
@@ -374,7 +374,7 @@ def report_file(report: LightenReport, name: str) -> bytes:
 
 
 def lighten_lines(report: LightenReport) -> list[str]:
-    """The report for a person: sizes, and the expressions that are furthest off."""
+    """The report as text: sizes, and the expressions with the largest errors."""
     titles = {
         "joints": "joints", "correctives": "correctives", "levels": "levels of detail",
         "meshes": "meshes", "channels": "blend shape channels", "deltas": "deltas",
@@ -407,6 +407,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """Names of controls without their prefix, a corrective of many as its first four."""
+    """Control names without their prefix; a corrective of many controls shows its first four."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

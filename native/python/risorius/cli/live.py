@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius live: listen to a face-capture app, show what comes, record it."""
+"""risorius live: listen to a face-capture app, show its status, record it."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before anything is listened to."""
+    """Raises CommandLineError for wrong options, before the program listens."""
     if args.record is None:
         return
     require_suffix(args.record, _KINDS, "--record")
@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(take: Take, shaper: Shaper, path: Path) -> None:
-    """Write what was recorded, and say what is not in it."""
+    """Write the take, and report left-out frames."""
     if not len(take):
         raise InputError(f"{path} was not written: no face came")
     if take.full:
@@ -120,7 +120,7 @@ def _save(take: Take, shaper: Shaper, path: Path) -> None:
 
 
 def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
-    """Show the status until the time is over, or somebody ends it."""
+    """Show the status until the time is over or the user stops it."""
     ended: list[int] = []
 
     def end(number: int, _frame: FrameType | None) -> None:
@@ -147,7 +147,7 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
 
 
 def _place(receiver: Receiver) -> str:
-    """Who is heard, and where: what to type into the app."""
+    """Who can connect, and where: the address to type into the app."""
     if receiver.host == THIS_MACHINE:
         return f"this machine alone at port {receiver.port}; --everywhere for a phone"
     address = own_address() or "this machine's address"
@@ -155,7 +155,7 @@ def _place(receiver: Receiver) -> str:
 
 
 def words(status: Status) -> str:
-    """One line of what comes."""
+    """The status as one line."""
     if not status.subject:
         heard = "nothing heard yet" if not status.packets else "no face yet"
         refused = f", {status.refused} refused ({status.reasons[0][0]})" if status.refused else ""

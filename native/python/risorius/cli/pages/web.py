@@ -45,7 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.set_defaults(func=run)
 
 
-_LAST_LOD = 65535  # of the format
+_LAST_LOD = 65535  # limit of the format
 
 
 def _lods(text: str | None) -> tuple[int, int] | None:
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
             raise CommandLineError("--sound: it goes with a clip: --clip TAKE")
         require_suffix(args.sound, SOUNDS, "--sound")
     lods = _lods(args.lods)
-    empty_page()  # a build without the page says so before the file is read
+    empty_page()  # fails for a build without the page before it reads the file
     dna = risorius.load(args.file, lods=lods)
     clip = None
     if args.clip is not None:
