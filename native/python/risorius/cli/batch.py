@@ -24,10 +24,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "batch",
         help="many clips on many characters: baked files and statistics",
-        description="Evaluates clips x characters x LODs as a JOBS.toml says, writes .npz, .csv or "
-        ".rzc files and a summary of all jobs. What is done already (same clip, DNA, options and "
-        "version, files untouched) is not done again, so an interrupted batch goes on where it "
-        "was. Exit code 1 if a job failed, 130 if interrupted.",
+        description="Evaluates clips x characters x LODs from a JOBS.toml, writes .npz, .csv or "
+        ".rzc files and a summary of all jobs. A finished job (same clip, DNA, options and "
+        "version, files untouched) is skipped, so an interrupted batch continues. The exit code is "
+        "1 if a job failed, 130 after an interrupt.",
     )
     parser.add_argument("jobs", type=Path, metavar="JOBS.toml", help="see docs/batch.md")
     where = parser.add_mutually_exclusive_group()
@@ -35,19 +35,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--workers",
         type=whole_number(1, 1024),
         metavar="N",
-        help="processes of this machine (as many as cores)",
+        help="processes on this machine (default: one per core)",
     )
     where.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="of an existing Dask cluster, e.g. tcp://host:8786, whose workers see the files by "
-        "the same paths and have this version of risorius",
+        help="scheduler of a Dask cluster, e.g. tcp://host:8786; its workers need this version of "
+        "risorius and must see the files at the same paths",
     )
     again = parser.add_mutually_exclusive_group()
     again.add_argument(
-        "--resume", action="store_true", help="do what is not done yet (this is the default)"
+        "--resume", action="store_true", help="run the jobs that are not done yet (default)"
     )
-    again.add_argument("--restart", action="store_true", help="do everything again")
+    again.add_argument("--restart", action="store_true", help="run all jobs again")
     parser.add_argument("--dry-run", action="store_true", help="list the jobs, do none")
     parser.add_argument("--json", action="store_true", help="for a program")
     parser.set_defaults(func=run)

@@ -39,20 +39,24 @@ cold       from memory, after other work has had the caches; crowd, clip: many p
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "bench",
-        help="how fast this machine evaluates a face",
+        help="measure the evaluation speed of a face",
         description="Measures the evaluator against a plain sparse matrix (CSR) in the same run: "
-        "medians, one core, never the same frame twice in a row. Takes about a minute; close what "
-        "else runs.",
+        "medians, one core, never the same frame twice in a row. Takes about a minute; close "
+        "other programs.",
     )
     parser.add_argument("file", type=Path)
     parser.add_argument(
         "--frames",
         type=Path,
         metavar="FRAMES.npz",
-        help=f"float32[frames, raw controls] as {', '.join(FRAMES)}; otherwise their like is made",
+        help=f"float32[frames, raw controls] as {', '.join(FRAMES)}; default: generated frames",
     )
-    parser.add_argument("--sweep", action="store_true", help="how cost grows, as CSV")
-    parser.add_argument("--quick", action="store_true", help="seconds, not a minute, and less sure")
+    parser.add_argument(
+        "--sweep", action="store_true", help="print the cost by problem size as CSV"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="seconds instead of a minute, less accurate"
+    )
     parser.set_defaults(func=run)
 
 

@@ -15,20 +15,22 @@ from ..rigs.joint_controls import joint_controls
 from .files import InputError, from_json, summary
 
 _DESCRIPTION = """\
-Prints a line for everything that is wrong (an error: the file is refused) or odd (a warning) in
-each file, with its byte and its field, and one line about the file as a whole. A file whose name
-ends in .json is read as JSON. Exit code 1 if a file has an error."""
+Prints a line for each error (the file is refused) and each warning (the file is odd), with its
+byte and its field, and one line for the file as a whole. A file named *.json is read as JSON. The
+exit code is 1 if a file has an error."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "check", help="what is wrong or odd in files", description=_DESCRIPTION
+        "check", help="find errors and oddities in files", description=_DESCRIPTION
     )
     parser.add_argument("files", nargs="+", metavar="FILE")
-    parser.add_argument("--json", action="store_true", help="for a program")
-    parser.add_argument("--strict", action="store_true", help="a warning fails like an error")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
     parser.add_argument(
-        "--mix", action="store_true", help="and whether each can be mixed with the first one"
+        "--mix",
+        action="store_true",
+        help="also check whether each file can be mixed with the first",
     )
     parser.set_defaults(func=run)
 

@@ -31,8 +31,8 @@ from .files import (
 
 _NEWEST = 8
 _DESCRIPTION = """\
-Reads INPUT and writes OUTPUT: .dna or .json by the suffix of each, "-" is the standard input or
-output. OUTPUT may be there already and is replaced as a whole or, after an error, not at all."""
+Reads INPUT and writes OUTPUT. The suffix of each decides: .dna or .json; "-" is the standard input
+or output. An existing OUTPUT is replaced as a whole or, after an error, not at all."""
 # Option of the command -> argument of Dna.convert.
 _SYSTEM = {
     "axes": "axes",
@@ -46,19 +46,21 @@ _SYSTEM = {
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "convert", help="to and from JSON, another version, other axes", description=_DESCRIPTION
+        "convert",
+        help="convert to and from JSON, to another version or other axes",
+        description=_DESCRIPTION,
     )
     parser.add_argument("input", metavar="INPUT")
     parser.add_argument("output", metavar="OUTPUT")
-    parser.add_argument("--from", dest="input_kind", choices=KINDS, help="what INPUT is")
-    parser.add_argument("--to", dest="output_kind", choices=KINDS, help="what OUTPUT becomes")
+    parser.add_argument("--from", dest="input_kind", choices=KINDS, help="format of INPUT")
+    parser.add_argument("--to", dest="output_kind", choices=KINDS, help="format of OUTPUT")
     parser.add_argument(
         "--version",
         choices=[f"2.{minor}" for minor in range(1, _NEWEST + 1)],
-        help="of the file (default: that of INPUT)",
+        help="version of OUTPUT (default: the version of INPUT)",
     )
-    parser.add_argument("--layers", metavar="NAMES", help="only these, e.g. behavior,geometry")
-    parser.add_argument("--lods", metavar="LODS", help="only these, e.g. 0 or 0-2 or 0,3,5")
+    parser.add_argument("--layers", metavar="NAMES", help="layers to keep, e.g. behavior,geometry")
+    parser.add_argument("--lods", metavar="LODS", help="LODs to keep, e.g. 0 or 0-2 or 0,3,5")
     parser.add_argument(
         "--unknown-layers",
         choices=("preserve", "ignore"),
@@ -69,7 +71,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--indent", type=whole_number(0, 8), metavar="N", help="spaces per level of JSON, 0 to 8"
     )
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
-    _add_system(parser.add_argument_group("coordinates of the result (default: those of INPUT)"))
+    _add_system(
+        parser.add_argument_group("coordinates of the result (default: the coordinates of INPUT)")
+    )
     parser.set_defaults(func=run)
 
 
@@ -82,7 +86,7 @@ def _add_system(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--rotation-signs", nargs=3, type=int, choices=(1, -1), metavar=("X", "Y", "Z")
     )
-    group.add_argument("--winding", choices=("ccw", "cw"), help="of the faces")
+    group.add_argument("--winding", choices=("ccw", "cw"), help="winding of the faces")
     group.add_argument("--translation-unit", choices=("cm", "m"))
     group.add_argument("--rotation-unit", choices=("degrees", "radians"))
 

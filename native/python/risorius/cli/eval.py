@@ -27,16 +27,16 @@ Floats = npt.NDArray[np.float32]
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "eval",
-        help="the pose that some control values give, or every frame of a clip",
+        help="evaluate a pose of control values, or every frame of a clip",
         usage="%(prog)s DNA [NAME=VALUE ...] [--lod N] [--gui] [--explain [--top N]] [--json]\n"
         "       %(prog)s CLIP DNA -o OUT.npz|OUT.csv [--lod N] [--rate R] [--frames A:B]\n"
         "                     [--what LIST] [--quaternions] [--compress] [--json]",
         description="One pose, without -o: prints every joint, blend shape channel and animated "
         "map that is not at rest. "
         "Joint values are deltas from neutral in the file's units and axes; scale 0 is no scale. "
-        "A value may lie outside 0..1: raw controls are not clamped, correctives clamp what they "
-        "multiply, GUI controls outside every interval of their table give nothing. "
-        "With -o, evaluates every frame of a clip (.rzc, CSV, JSON, any capture that is read) on a "
+        "A value may lie outside 0..1: raw controls are not clamped, correctives clamp their "
+        "factors, GUI controls outside every interval of their table have no effect. "
+        "With -o, evaluates every frame of a clip (.rzc, CSV, JSON, any supported capture) on a "
         "character and writes the animation; controls without a curve are at rest.",
     )
     parser.add_argument("file", type=Path, metavar="DNA or CLIP")
@@ -44,23 +44,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "controls",
         nargs="*",
         metavar="NAME=VALUE or DNA",
-        help="of one pose: the rest is at rest; a part of a name or an ARKit name will do if it "
-        "can mean one control (or its left and right) only",
+        help="control values of one pose; other controls are at rest; a part of a name or an ARKit "
+        "name is enough if it matches one control only (or its left and right)",
     )
     parser.add_argument(
         "--explain",
         action="store_true",
-        help="in words: which correctives, solvers and networks are at work, which joints move "
-        "most, and which control has which part in it",
+        help="explain the pose in words: active correctives, solvers and networks, the joints that "
+        "move most, and the share of each control",
     )
     parser.add_argument(
         "--top",
         type=whole_number(0, 1_000_000),
         default=10,
         metavar="N",
-        help="lines of each list of --explain (10)",
+        help="lines per list of --explain (10)",
     )
-    parser.add_argument("--gui", action="store_true", help="the names are of GUI controls")
+    parser.add_argument("--gui", action="store_true", help="the names are GUI controls")
     parser.add_argument(
         "--lod",
         type=whole_number(0, 65_535),
@@ -68,7 +68,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="N",
         help="0 is the finest (default)",
     )
-    parser.add_argument("--json", action="store_true", help="for a program")
+    parser.add_argument("--json", action="store_true", help="print JSON")
     eval_clip.add_options(parser)
     parser.set_defaults(func=run)
 

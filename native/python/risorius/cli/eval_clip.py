@@ -34,24 +34,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT",
         help="OUT.npz: joints, blend_shapes, animated_maps, controls as float32[frames, ...] with "
-        "names, times in seconds and units, all numbers; OUT.csv: a row a frame, its time and the "
-        "numbers that are not at rest throughout",
+        "names, times in seconds and units; OUT.csv: a row per frame with its time and the "
+        "numbers that leave rest in some frame",
     )
     group.add_argument(
         "--mapping",
         metavar="NAME|FILE.toml",
-        help="how the clip's curves become raw controls; else the mapping that fits, for .rzc none",
+        help="mapping of the clip's curves to raw controls (default: the best fit; .rzc: none)",
     )
     group.add_argument("--rate", metavar="R", help="resample to R frames per second first")
     group.add_argument(
         "--frames",
         metavar="A:B",
-        help="frames A to B - 1 only, counted from 0 after --rate; A: and :B go to the ends",
+        help="only frames A to B - 1, counted from 0 after --rate; A: and :B go to the ends",
     )
     group.add_argument(
         "--what",
         metavar="LIST",
-        help=f"which of {','.join(PARTS)} to write ({','.join(DEFAULT_PARTS)})",
+        help=f"parts to write: {','.join(PARTS)} (default {','.join(DEFAULT_PARTS)})",
     )
     group.add_argument(
         "--quaternions", action="store_true", help="joint rotations as qx qy qz qw, not as angles"

@@ -19,21 +19,21 @@ from .files import CommandLineError
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     info = subparsers.add_parser(
         "info",
-        help="what is inside a DNA file, or differs between two",
-        description="What is inside a file. With --diff, what differs between two (.dna or "
-        ".json), in words; the exit code is then that of diff: 0 the same, 1 different, 2 trouble.",
+        help="show the content of a DNA file, or the differences between two",
+        description="Shows the content of a file. With --diff, shows the differences between two "
+        "files (.dna or .json) in words; exit codes as in diff: 0 same, 1 different, 2 error.",
     )
     info.add_argument("file", type=Path, nargs="?")
-    info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="what differs between two files")
+    info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="differences between two files")
     info.add_argument("--all", action="store_true", help="with --diff: do not shorten lists")
     info.add_argument(
         "--mix-with",
         nargs="+",
         metavar="FACE",
-        help="which of these can be mixed with the file (risorius mix), and why others cannot; the "
-        "exit code is 1 where one cannot",
+        help="check which of these faces can be mixed with the file (risorius mix), and why others "
+        "cannot; the exit code is 1 if one cannot",
     )
-    info.add_argument("--json", action="store_true", help="for a program")
+    info.add_argument("--json", action="store_true", help="print JSON")
     info.set_defaults(func=run)
 
 

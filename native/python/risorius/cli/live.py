@@ -37,10 +37,10 @@ _KINDS = (".rzc", ".csv")
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "live",
-        help="faces from a phone, as they come; recorded",
-        description="Listens for Live Link Face (ARKit mode) or for VMC and other OSC, shows on "
-        "one line what comes, and records a subject as curves of raw controls at the sender's own "
-        "times. Ctrl-C ends it and saves.",
+        help="show and record a face from a phone",
+        description="Listens for Live Link Face (ARKit mode) or for VMC and other OSC, shows the "
+        "status on one line, and records a subject as curves of raw controls at the sender's own "
+        "times. Ctrl-C stops and saves.",
     )
     parser.add_argument("--source", choices=SOURCES, default="livelink", help="default livelink")
     ports = ", ".join(f"{port} for {source}" for source, port in PORTS.items())
@@ -50,26 +50,29 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--everywhere",
         action="store_true",
-        help="listen to the network too, as a phone needs; else to this machine alone",
+        help="also listen to the network (needed for a phone); default: this machine only",
     )
     parser.add_argument(
         "--subject",
         default="",
         metavar="NAME",
-        help="as the app names it; it gets a place whoever else sends (default: the first heard)",
+        help="name of the subject in the app; it always gets a place (default: the first)",
     )
     parser.add_argument("--record", type=Path, metavar="OUT", help="clip.rzc or clip.csv")
     parser.add_argument(
-        "--seconds", type=number(0.0, above=True), metavar="N", help="end after them"
+        "--seconds", type=number(0.0, above=True), metavar="N", help="stop after N seconds"
     )
     parser.add_argument(
-        "--mapping", default="arkit", metavar="NAME|FILE", help="of names to controls, as TOML"
+        "--mapping",
+        default="arkit",
+        metavar="NAME|FILE",
+        help="mapping of names to controls, as TOML",
     )
     parser.add_argument(
-        "--range", type=Path, metavar="FILE", help="of the person, from risorius clip learn"
+        "--range", type=Path, metavar="FILE", help="the person's ranges, from risorius clip learn"
     )
     parser.add_argument(
-        "--gain", type=number(-1e6, 1e6), default=1.0, metavar="X", help="on all units"
+        "--gain", type=number(-1e6, 1e6), default=1.0, metavar="X", help="factor for all units"
     )
     parser.set_defaults(func=run)
 

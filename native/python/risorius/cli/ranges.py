@@ -33,18 +33,18 @@ def add_learn(
     """
     parser = commands.add_parser(
         "learn",
-        help="neutral and extremes of a person, from a capture",
-        description="Finds how far each control goes in a take in which the person goes from a "
-        "face at rest to all extremes, one after another. The file is text: look at it, edit it, "
-        "give it to clip convert and live as --range.",
+        help="learn the neutral face and the extremes of a person from a capture",
+        description="Finds the range of each control in a take of the person's neutral face and "
+        "of all extremes, one after another. The result is a text file: check it, edit it, and "
+        "pass it to clip convert and live with --range.",
     )
     add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="NAME.range.toml")
-    parser.add_argument("--mapping", metavar="M", help="as of clip convert")
+    parser.add_argument("--mapping", metavar="M", help="the same as in clip convert")
     parser.add_argument(
         "--performance",
         action="store_true",
-        help="the take shows acting: only peaks that stop at one height again and again, and "
+        help="the take shows acting: only peaks that repeatedly stop at the same height, and "
         "blinks, count as extremes",
     )
     parser.add_argument(
@@ -52,7 +52,7 @@ def add_learn(
         type=number(1.0, 4.0),
         default=MOST_GAIN,
         metavar="X",
-        help=f"controls that would need more are left as captured, 1 to 4 (default {MOST_GAIN:g}; "
+        help=f"controls that need a larger gain stay as captured, 1 to 4 (default {MOST_GAIN:g}; "
         "lids 2)",
     )
     parser.set_defaults(func=lambda args: _run(args, load))
