@@ -92,7 +92,7 @@ void take_filter_off(std::uint8_t* rows, const Packing& packing) {
   }
 }
 
-/// The corners as uint32, which is what the library packs. In: rows  of 2 or 4 bytes
+/// The corners as uint32, the input type of the library. In: rows  of 2 or 4 bytes
 std::vector<std::uint32_t> corners_of(std::span<const std::uint8_t> rows, std::size_t stride) {
   std::vector<std::uint32_t> out(rows.size() / stride);
   for (std::size_t i = 0; i < out.size(); ++i) {

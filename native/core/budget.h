@@ -20,7 +20,7 @@ class Budget {
   Budget(std::string stage, std::uint64_t most_bytes, std::uint64_t most_steps)
       : stage_(std::move(stage)), most_bytes_(most_bytes), most_steps_(most_steps) {}
 
-  /// Fails: kLimitExceeded with the field, the total that was asked for, and the limit.
+  /// Fails: kLimitExceeded with the field, the requested total, and the limit.
   Status take_bytes(std::uint64_t count, const std::string& where) {
     return take(count, bytes_, most_bytes_, "bytes", where);
   }

@@ -34,7 +34,7 @@ const char* to_string(ErrorCode code);
 /// The kind and the place of an error.
 /// offset   byte offset in the file, if the error has one
 /// where    the DNA field, e.g. "behavior.joint_groups[3].values"
-/// message  one sentence: what was found and what was expected
+/// message  one sentence with the found and the expected value
 struct Error {
   ErrorCode code = ErrorCode::kInvalidValue;
   std::optional<std::uint64_t> offset;

@@ -44,7 +44,7 @@ enum class Traversal : std::uint8_t {
 };
 
 /// The active controls for which something in a workspace was computed: it stays valid while the
-/// same controls are not 0. In a film of 60 frames a second, five frames of six have the active
+/// same controls are not 0. In a film of 60 frames per second, five frames of six have the active
 /// controls of the frame before.
 struct KeptControls {
   std::vector<std::uint16_t> controls;  // [controls]: the first count count

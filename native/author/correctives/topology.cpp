@@ -18,7 +18,7 @@ constexpr double kOpposed = -0.2;   // cosine: surfaces below it face each other
 // Mm: a vertex this far behind a surface still counts as in front of it.
 constexpr double kInFront = -0.2;
 constexpr std::size_t kWays = 128;  // directions from which light may come
-constexpr std::ptrdiff_t kLit = 6;  // so many of them make a vertex lit
+constexpr std::ptrdiff_t kLit = 6;  // open directions that make a vertex lit
 constexpr std::size_t kRim = 2;     // edges: neighbours of lit vertices that are shown too
 constexpr std::size_t kRings = 3;   // edges: vertices this near cannot touch each other
 

@@ -21,7 +21,7 @@ struct CurvesView {
   std::span<const std::string> names;
   std::span<const float> values;  // [names, frames]
   std::size_t frame_count = 0;
-  double rate = 60.0;             // frames a second
+  double rate = 60.0;             // frames per second
   double start = 0.0;             // seconds
   std::span<const double> times;  // [frames], ascending seconds; empty: start + i / rate
 };
@@ -34,7 +34,7 @@ enum class Blend : std::uint8_t {
   kMax,       // b * (1 - m) + max(b, v) * m
 };
 
-/// What a layer does before its start and after its end.
+/// Behaviour of a layer before its start and after its end.
 enum class Extend : std::uint8_t {
   kHold,         // both ends are held
   kHoldForward,  // nothing before the start; the end is held

@@ -1339,36 +1339,36 @@ def fit_motions(
     """JointFit with these weights: see risorius.author.fitting."""
 
 class FaultSums:
-    """What is worse than allowed, in one number of each kind."""
+    """The faults beyond the allowed ones, as one number of each kind."""
 
     @property
     def volume(self) -> float:
-        """mm3: depth times area."""
+        """mm3: sum of depth times area."""
     @property
     def deepest(self) -> float:
-        """mm beyond what is allowed."""
+        """mm beyond the allowed depth."""
     @property
     def stretched(self) -> int:
-        """Faces of more than 2.5 times their area."""
+        """Number of faces with more than 2.5 times their neutral area."""
     @property
     def widest(self) -> float:
-        """Times its area, of the most stretched of these."""
+        """Area of the most stretched face, relative to its neutral area."""
     @property
     def folded(self) -> int:
-        """Edges whose faces lie on one another."""
+        """Number of edges whose faces lie on one another."""
 
 class SkinFaults:
-    """What may be wrong with a pose of a skin."""
+    """The faults of a posed skin."""
 
     def __init__(
         self, depth: npt.ArrayLike, stretch: npt.ArrayLike, fold: npt.ArrayLike
     ) -> None: ...
     @property
     def depth(self) -> _F32:
-        """float32[V], mm inside of a solid, or of the skin itself."""
+        """float32[V], depth in mm inside a solid or the skin itself."""
     @property
     def stretch(self) -> _F32:
-        """float32[F], area beside the neutral one."""
+        """float32[F], area relative to the neutral area."""
     @property
     def fold(self) -> _F32:
         """float32[inner edges], cosine between the normals of both faces."""
@@ -1386,7 +1386,7 @@ class SkinChecker:
     ) -> None: ...
     @property
     def shown(self) -> npt.NDArray[np.bool_]:
-        """bool[V]: what somebody may see; nothing else is asked to stay outside."""
+        """bool[V]: visible vertices; only these must stay outside."""
     def nearest(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> tuple[_U32, _F64, _F64]:
         """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] shares of
         them, float64[n] mm."""

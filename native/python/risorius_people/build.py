@@ -108,7 +108,7 @@ def even_weights(mesh: Mesh) -> None:
 
 
 def round_numbers(dna: Dna) -> None:
-    """Round all numbers to small steps, far below what the eye sees: the file packs to two thirds.
+    """Round all numbers to small steps, far below visible errors: the file packs to two thirds.
 
     Args:
         dna: its meshes and joint groups are changed.

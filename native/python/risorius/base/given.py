@@ -25,7 +25,7 @@ _SHOWN = 40  # characters of a value that an error shows
 
 
 class GivenError(ArgumentError):
-    """A value of the wrong type or range; the sentence says what was expected.
+    """A value of the wrong type or range; the sentence names the expected value.
 
     It names no file and no field; the reader adds them.
     """

@@ -178,7 +178,7 @@ _PARTS = (("eyeball", BALL, _COARSE_BALL), ("cornea", SHELL, _COARSE_CORNEA))
 def with_eyeballs(base: BaseMesh) -> BaseMesh:
     """The base mesh with the groups eyeball-l, cornea-l and so on, and their coarse versions.
 
-    All new vertices lie at the origin; `seat` places them for a person.
+    All new vertices lie at the origin; `seat` places them in a face.
 
     Args:
         base: is not changed; a mesh that already has eyeballs is returned as it is.

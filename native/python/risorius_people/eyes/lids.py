@@ -33,7 +33,7 @@ _TOGETHER = (
     ("eyeCheekRaise", "eyeLookUp"),
     ("eyeSquintInner", "eyeLookDown"),
 )
-# Expressions that leave the lids of a closed eye still.
+# Expressions that do not move the lids of a closed eye.
 _NOT_CLOSED = [
     *(f"eyeLook{way}" for way in LOOKS),
     "eyeSquintInner",

@@ -14,7 +14,7 @@ from .atlas import ATLAS_SIZE, DENSE, TILES
 _GREY = (0.74, 0.73, 0.71)
 _LASH_DARK = 0.3  # factor on the brows' colour
 _LOOSE = 0.6
-_CURLY = 0.6  # hair_curl from which single hairs are no longer visible
+_CURLY = 0.6  # hair_curl above which single hairs are not visible
 
 
 @dataclass
