@@ -112,7 +112,7 @@ def test_alembic_has_the_cloth_of_each_frame(mode, dna_file, tmp_path):
     _rig, item = simulations.moving(dna_file, mode)
     wanted = simulations.film(item)
     simulations.cloth(item)
-    if mode != "KEYS":  # see docs/performance.md: a graph of the exporter's own is told afterwards
+    if mode != "KEYS":  # see docs/measurements/blender.md: a graph of the exporter's own is told afterwards
         assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
     path = str(tmp_path / "face.abc")
     bpy.ops.wm.alembic_export(

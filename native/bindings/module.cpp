@@ -15,6 +15,7 @@ void bind_edit(py::module_& m);
 void bind_files(py::module_& m);
 void bind_mixer(py::module_& m);
 void bind_outputs(py::module_& m);
+void bind_register(py::module_& m);
 void bind_rig(py::module_& m);
 void bind_skin(py::module_& m);
 void bind_solve(py::module_& m);
@@ -62,6 +63,7 @@ PYBIND11_MODULE(_native, m) {
   risorius::bindings::bind_edit(m);
   risorius::bindings::bind_author(m);
   risorius::bindings::bind_correct(m);
+  risorius::bindings::bind_register(m);
   risorius::bindings::bind_files(m);
   risorius::bindings::bind_mixer(m);
   risorius::bindings::bind_clip(m);

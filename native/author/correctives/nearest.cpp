@@ -23,14 +23,17 @@ bool passes(const Vec3& from, const Vec3& inverse, const Vec3& low, const Vec3& 
   return std::max(a.cwiseMin(b).maxCoeff(), 0.0) <= a.cwiseMax(b).minCoeff();
 }
 
-/// Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997)
-bool meets(const Vec3& from, const Vec3& way, const Vec3& a, const Vec3& b, const Vec3& c) {
+/// Where a ray meets a triangle: the shares of b and c, and how many times `way` it is from `from`.
+/// Source: Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997)
+std::optional<Vec3> meeting(const Vec3& from, const Vec3& way, const Vec3& a, const Vec3& b,
+                            const Vec3& c) {
   const Vec3 ab = b - a, ac = c - a, across = way.cross(ac);
   const double turn = ab.dot(across);
-  if (std::abs(turn) < 1e-12) return false;
+  if (std::abs(turn) < 1e-12) return std::nullopt;
   const Vec3 to = from - a, up = to.cross(ab);
-  const double u = to.dot(across) / turn, v = way.dot(up) / turn;
-  return u >= 0 && v >= 0 && u + v <= 1 && ac.dot(up) / turn > 0;
+  const double u = to.dot(across) / turn, v = way.dot(up) / turn, times = ac.dot(up) / turn;
+  if (!(u >= 0 && v >= 0 && u + v <= 1 && times > 0)) return std::nullopt;
+  return Vec3(u, v, times);
 }
 
 }  // namespace
@@ -122,10 +125,41 @@ bool Nearest::is_blocked(const Vec3& from, const Vec3& direction) const {
     }
     for (std::uint32_t i = box.begin; i < box.end; ++i) {
       const Triangle& t = triangles_[order_[i]];
-      if (meets(from, direction, positions_[t[0]], positions_[t[1]], positions_[t[2]])) return true;
+      if (meeting(from, direction, positions_[t[0]], positions_[t[1]], positions_[t[2]]))
+        return true;
     }
   }
   return false;
+}
+
+std::optional<Nearest::Hit> Nearest::first_hit(const Vec3& from, const Vec3& direction,
+                                               double reach) const {
+  const Vec3 inverse = direction.cwiseInverse();
+  std::optional<Hit> best;
+  std::vector<std::uint32_t> open;
+  if (!boxes_.empty()) open.push_back(0);
+  while (!open.empty()) {
+    const std::uint32_t at = open.back();
+    const Box& box = boxes_[at];
+    open.pop_back();
+    if (!passes(from, inverse, box.low, box.high)) continue;
+    if (squared_to_box(from, box.low, box.high) >= reach * reach) continue;
+    if (box.second != 0) {
+      open.push_back(at + 1);
+      open.push_back(box.second);
+      continue;
+    }
+    for (std::uint32_t i = box.begin; i < box.end; ++i) {
+      const Triangle& t = triangles_[order_[i]];
+      const Vec3 &a = positions_[t[0]], &b = positions_[t[1]], &c = positions_[t[2]];
+      const std::optional<Vec3> met = meeting(from, direction, a, b, c);
+      if (!met || (*met)[2] >= reach) continue;
+      reach = (*met)[2];
+      const Vec3 share(1 - (*met)[0] - (*met)[1], (*met)[0], (*met)[1]);
+      best = Hit{order_[i], share, from + reach * direction, reach};
+    }
+  }
+  return best;
 }
 
 void Nearest::look(const Vec3& p, std::uint32_t at, core::FunctionRef<bool(std::uint32_t)> takes,

@@ -30,6 +30,9 @@ class Nearest {
 
   /// Whether a ray meets a triangle. In: direction  of any length
   bool is_blocked(const Vec3& from, const Vec3& direction) const;
+  /// The first triangle on a ray, seen from either side, that is nearer than `reach`.
+  /// In: direction  of length 1
+  std::optional<Hit> first_hit(const Vec3& from, const Vec3& direction, double reach) const;
   /// The nearest triangle that `takes` accepts and that is nearer than `reach`.
   std::optional<Hit> find(const Vec3& p, double reach,
                           core::FunctionRef<bool(std::uint32_t)> takes) const;

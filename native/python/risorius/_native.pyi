@@ -15,6 +15,7 @@ from .base.errors import RisoriusError
 
 _F32: TypeAlias = npt.NDArray[np.float32]
 _F64: TypeAlias = npt.NDArray[np.float64]
+_I32: TypeAlias = npt.NDArray[np.int32]
 _U16: TypeAlias = npt.NDArray[np.uint16]
 _U32: TypeAlias = npt.NDArray[np.uint32]
 _Int: TypeAlias = SupportsInt | SupportsIndex
@@ -1402,6 +1403,41 @@ class SkinChecker:
         without: Sequence[npt.ArrayLike],
     ) -> tuple[_F64, FaultSums, FaultSums]:
         """float64[V, 3] to be added, FaultSums before and after."""
+
+class ClosestPoints:
+    """A surface of triangles that finds its points closest to others."""
+
+    def __init__(self, points: npt.ArrayLike, triangles: npt.ArrayLike) -> None: ...
+    def nearest(
+        self,
+        queries: npt.ArrayLike,
+        normals: npt.ArrayLike | None = None,
+        least_cosine: _Float = -1.0,
+        farthest: _Float = ...,
+        threads: _Int = 0,
+    ) -> tuple[_I32, _F64, _F64]:
+        """int32[n] triangle (-1: none), float64[n, 3] barycentric coordinates, float64[n] distance.
+
+        With normals, only triangles count whose normal has at least that cosine with the normal of
+        the query."""
+    def first_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        farthest: _Float = ...,
+        threads: _Int = 0,
+    ) -> tuple[_I32, _F64, _F64]:
+        """int32[n] the first triangle on each ray (-1: none), float64[n, 3] barycentric
+        coordinates, float64[n] distance from the origin."""
+
+class SparseCholesky:
+    """The Cholesky factors of a sparse symmetric positive definite matrix."""
+
+    def __init__(
+        self, rows: npt.ArrayLike, columns: npt.ArrayLike, values: npt.ArrayLike, size: _Int
+    ) -> None: ...
+    def solve(self, right: npt.ArrayLike, threads: _Int = 0) -> _F64:
+        """float64[n, sides]."""
 
 def simplify(
     positions: npt.ArrayLike,

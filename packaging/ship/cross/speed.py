@@ -5,7 +5,7 @@ least times and of the medians.
     speed.py FACE.dna FOLDER OTHER [ROUNDS]    folders that `pip install --target` filled, for this
                                                Python
 
-What is timed is what docs/performance.md times: frames of a face of which 60 raw controls change,
+What is timed is what docs/measurements/evaluator.md times: frames of a face of which 60 raw controls change,
 compiling it, reading its file. A quotient above 1: FOLDER is slower than OTHER.
 """
 

@@ -23,7 +23,7 @@ def test_every_page_of_the_navigation_and_all_that_it_links_to_is_there(tmp_path
     gather = _part("gather")
     nav = (PROJECT / "packaging" / "ship" / "site" / "mkdocs.yml").read_text(encoding="utf-8")
     names = gather.listed(nav)
-    written = {p.relative_to(PROJECT).as_posix() for p in (PROJECT / "docs").glob("*.md")}
+    written = {p.relative_to(PROJECT).as_posix() for p in (PROJECT / "docs").rglob("*.md")}
     assert written <= set(names)
     gather.copy_pages(tmp_path, names)
     for name in names:

@@ -29,27 +29,29 @@ def _all() -> dict[str, object]:
     return {
         "risorius_converge": bpy.props.FloatProperty(
             name="Eyes Meet",
-            description="Both eyes look at the target itself; at 0 they stay side by side. They "
-            "come together as the target leaves its place",
+            description=(
+                "Amount by which both eyes turn towards the target itself; at 0 they stay parallel"
+            ),
             **shared,
         ),
         "risorius_lids": bpy.props.FloatProperty(
             name="Lids Follow",
-            description="How far the lids go along with a gaze up or down, beyond what the rig "
-            "does by itself",
+            description="Motion of the lids with a gaze up or down, in addition to the rig",
             **shared,
         ),
         "risorius_body_turn": bpy.props.FloatProperty(
             name="Body's Turn",
-            description="How much of the turns of the body's neck and head the face takes",
+            description="Share of the turn of the body's neck and head that the face follows",
             default=1.0,
             **shared,
         ),
         "risorius_neck_poses": bpy.props.BoolProperty(
             name="Head Drives Neck Poses",
-            description="Turns of head and neck fill the raw controls that hold the rotations of "
-            "these joints, and poses of the file repair neck and jaw. Off: the sliders of these "
-            "controls lead",
+            description=(
+                "Fill the raw controls of head and neck rotations from their "
+                "joints, so that poses of the file repair neck and jaw. Off: "
+                "the sliders of these controls lead"
+            ),
             default=True,
             override=_OVERRIDE,
             update=_changed,

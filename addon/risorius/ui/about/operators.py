@@ -61,7 +61,7 @@ def describe(rig: ArmatureObject) -> list[str]:
 
 
 class RISORIUS_OT_describe(FaceOperator, Operator):
-    """List what the active face is made of, mesh by mesh"""
+    """List the parts of the active face, mesh by mesh"""
 
     bl_idname = "risorius.describe"
     bl_label = "Contents of the Face"
@@ -124,7 +124,7 @@ class RISORIUS_OT_self_test(Operator):
 
 
 class RISORIUS_OT_hide_hints(Operator):
-    """Do not say again what to do with a new face; the preferences bring it back"""
+    """Hide the first steps; the preferences show them again"""
 
     bl_idname = "risorius.hide_hints"
     bl_label = "Hide First Steps"

@@ -22,12 +22,12 @@ from ..words import say
 TARGETS = (
     ("ACTION", "Action", "As the face's active action; the one before is kept"),
     ("STRIP", "NLA Strip", "On a new NLA track"),
-    ("LAYER", "Layer", "As a layer above what the face does already"),
+    ("LAYER", "Layer", "As a layer above the existing animation"),
 )
 RANGES = (
-    ("EXTEND", "Extend", "The scene ends where the animation ends, if that is later"),
-    ("FIT", "Fit", "The scene begins and ends with the animation"),
-    ("KEEP", "Keep", "The scene's range stays as it is"),
+    ("EXTEND", "Extend", "Extend the scene to the end of the animation"),
+    ("FIT", "Fit", "Fit the scene to the animation"),
+    ("KEEP", "Keep", "Keep the range of the scene"),
 )
 _REPORT = "risorius_report"  # on an action: words on what became of the file
 _SHOWN = 6
@@ -41,7 +41,9 @@ class PlacesClip(FaceOperator):
     )
     start: bpy.props.FloatProperty(
         name="Start Frame",
-        description="Where the time 0 of the animation lies: its first frame, or its sound's begin",
+        description=(
+            "Frame of time 0 of the animation: its first frame, or the start of its sound"
+        ),
         default=1.0,
     )
     scene_range: bpy.props.EnumProperty(
@@ -50,8 +52,10 @@ class PlacesClip(FaceOperator):
 
     use_rest: bpy.props.BoolProperty(
         name="Bring to Rest",
-        description="Controls that the animation does not move go to rest; else they stay as "
-        "they are, and the report names them",
+        description=(
+            "Set controls to 0 that the animation does not move. Off: they "
+            "keep their values, and the report names them"
+        ),
         options={"SKIP_SAVE"},
     )
 

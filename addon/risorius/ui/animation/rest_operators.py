@@ -11,7 +11,7 @@ from ..words import say
 
 
 class RISORIUS_OT_rest_others(HandOperator, Operator):
-    """Bring the controls to rest that no key, layer or driver moves and that stand elsewhere"""
+    """Set controls to 0 that no key, layer or driver moves"""
 
     bl_idname = "risorius.rest_others"
     bl_label = "Bring to Rest"

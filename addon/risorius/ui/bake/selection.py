@@ -16,7 +16,7 @@ from ..common import FaceOperator, usable
 
 RANGES = (
     ("SCENE", "Scene", "The frame range of the scene"),
-    ("PREVIEW", "Preview", "The preview range, where one is set; else that of the scene"),
+    ("PREVIEW", "Preview", "The preview range if it is set, otherwise the range of the scene"),
     ("CUSTOM", "Custom", "Frames of your choice"),
 )
 
@@ -42,7 +42,7 @@ class FacesOperator(FaceOperator):
 
     every: bpy.props.BoolProperty(
         name="All Faces",
-        description="All faces of the scene, whatever is selected",
+        description="All faces of the scene, not only selected ones",
         options={"SKIP_SAVE"},
     )
 

@@ -23,7 +23,7 @@ from ..words import say
 
 LEADERS = (
     ("SLIDERS", "Sliders", "The sliders of the panel move the face"),
-    ("BOARD", "Board", "The face board moves the face; the sliders show what it gives"),
+    ("BOARD", "Board", "The face board moves the face; the sliders show its values"),
 )
 
 
@@ -31,10 +31,12 @@ KINDS = (
     (
         "PRIMARY",
         "Primary",
-        "Some 30 handles that lie as a face does: brows, lids, gaze, nose, cheeks, mouth, jaw, "
-        "tongue. What none leads to stays with its slider",
+        (
+            "Some 30 handles arranged like a face: brows, lids, gaze, nose, cheeks, "
+            "mouth, jaw, tongue. Other controls keep their sliders"
+        ),
     ),
-    ("COMPLETE", "Complete", "A handle for each control that the file gives its own board"),
+    ("COMPLETE", "Complete", "A handle for each GUI control of the file"),
 )
 
 
@@ -86,14 +88,14 @@ class _OnBoard(HandOperator):
 
 
 class RISORIUS_OT_add_board(_OwnArmature, Operator):
-    """Put a board of sliders beside the head, or bring back those of it that were deleted"""
+    """Add a face board beside the head, or restore its deleted handles"""
 
     bl_idname = "risorius.add_board"
     bl_label = "Add Face Board"
 
     kind: bpy.props.EnumProperty(
         name="Board",
-        description="Which board; where there is the other one, this takes its place in its pose",
+        description="Kind of board; it replaces the other kind and keeps the pose",
         items=KINDS,
         options={"SKIP_SAVE"},
     )
@@ -182,7 +184,7 @@ class RISORIUS_OT_frame_board(FaceOperator, Operator):
 
 
 class RISORIUS_OT_remove_board(_OwnArmature, Operator):
-    """Take the face board away; its pose goes to the sliders, keys stay in their actions"""
+    """Remove the face board; its pose goes to the sliders, keys stay in their actions"""
 
     bl_idname = "risorius.remove_board"
     bl_label = "Remove Face Board"
@@ -215,7 +217,7 @@ def _has_board(context: Context) -> bool:
 
 
 class RISORIUS_OT_lead(_Leading, Operator):
-    """Choose what moves the face: its sliders or its board. The pose goes over to it"""
+    """Choose whether sliders or the board move the face; the pose is converted"""
 
     bl_idname = "risorius.lead"
     bl_label = "Lead"
@@ -223,7 +225,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
     by: bpy.props.EnumProperty(name="By", description="What moves the face", items=LEADERS)
     use_keys: bpy.props.BoolProperty(
         name="Convert Keys",
-        description="Convert the keys of the action, in a copy; the action of before is kept",
+        description="Convert the keys in a copy of the action; the original is kept",
         default=True,
     )
 
@@ -275,7 +277,7 @@ class RISORIUS_OT_reset_board(_OnBoard, Operator):
     bl_label = "Reset Board"
 
     selected: bpy.props.BoolProperty(
-        name="Selected Only", description="Only those that are selected", options={"SKIP_SAVE"}
+        name="Selected Only", description="Only selected handles", options={"SKIP_SAVE"}
     )
 
     def move(self, context: Context) -> Collection[str] | None:
@@ -300,7 +302,7 @@ class RISORIUS_OT_select_board(FaceOperator, Operator):
 
     region: bpy.props.EnumProperty(name="Region", items=_regions)
     extend: bpy.props.BoolProperty(
-        name="Add to Selection", description="Keep what is selected", options={"SKIP_SAVE"}
+        name="Add to Selection", description="Add to the selection", options={"SKIP_SAVE"}
     )
 
     @classmethod

@@ -45,7 +45,7 @@ class _PointOperator(FaceOperator):
 
 
 class RISORIUS_OT_pin(_PointOperator, Operator):
-    """Hold a point of the skin while others are dragged, or let it go"""
+    """Pin a point of the skin while you drag others, or remove its pin"""
 
     bl_idname = "risorius.pin"
     bl_label = "Pin"
@@ -94,7 +94,7 @@ class RISORIUS_OT_select_handle(_PointOperator, Operator):
 
     extend: bpy.props.BoolProperty(
         name="Extend",
-        description="Beside those that are selected; a selected one is taken out",
+        description="Add to the selection; a selected handle is deselected",
         options={"SKIP_SAVE"},
     )
 

@@ -40,7 +40,7 @@ class RISORIUS_OT_drag(Operator):
     )
     offset: bpy.props.FloatVectorProperty(
         name="Offset",
-        description="How far the point is dragged, in the scene's axes and units",
+        description="Displacement of the point in axes and units of the scene",
         size=3,
         subtype="TRANSLATION",
         options={"SKIP_SAVE"},
@@ -56,7 +56,7 @@ class RISORIUS_OT_drag(Operator):
     region: properties.region_property()
     single: bpy.props.BoolProperty(
         name="One Slider",
-        description="Only the slider that does it best moves",
+        description="Move only the best slider",
         options={"SKIP_SAVE"},
     )
     choice: bpy.props.IntProperty(
@@ -64,7 +64,7 @@ class RISORIUS_OT_drag(Operator):
     )
     with_selected: bpy.props.BoolProperty(
         name="Selected Handles",
-        description="All selected handles go the same way",
+        description="Move all selected handles in the same way",
         options={"SKIP_SAVE"},
     )
 

@@ -54,8 +54,9 @@ class _Tool(WorkSpaceTool):
     bl_idname = IDNAME
     bl_label = "Drag the Face"
     bl_description = (
-        "Point at the skin and drag it. Ctrl: one slider, Tab the next; Shift click: pin, or "
-        "select handles, which go together; I keys and H hides those"
+        "Point at the skin and drag it. Ctrl: one slider, Tab: the next one; Shift-"
+        "click: pin, or select handles that move together; I keys handles, H hides "
+        "them"
     )
     bl_icon = "ops.pose.push"
     bl_widget = None
@@ -79,7 +80,7 @@ class DragInPoseMode(_Tool):
 
 
 class RISORIUS_OT_drag_tool(Operator):
-    """Take up the tool that drags the face by its skin, or put it down for the one before"""
+    """Activate the tool that drags the skin, or return to the earlier tool"""
 
     bl_idname = "risorius.drag_tool"
     bl_label = "Drag the Face"

@@ -62,20 +62,21 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     all_shapes: bpy.props.BoolProperty(
         name="All Shapes",
-        description="Write also shape keys that this range does not use",
+        description="Include shape keys that this range does not use",
         default=False,
     )
     influences: bpy.props.IntProperty(
         name="Influences",
-        description="Joints that move a vertex. Engines take 4 or 8; 0 writes all, which is what "
-        "Blender shows",
+        description=(
+            "Most joints of a vertex. Engines take 4 or 8; 0 writes all, as Blender shows them"
+        ),
         default=0,
         min=0,
         max=32,
     )
     fbx_units: bpy.props.EnumProperty(
         name="Units",
-        description="Where an FBX file says that a Blender unit is a metre",
+        description="Place in the FBX file that stores the unit",
         items=(
             ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
             ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
@@ -97,7 +98,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     maps: bpy.props.BoolProperty(
         name="With Maps",
-        description="Write also the values of the animated maps, which no other format can hold",
+        description="Include the values of animated maps",
         default=False,
     )
 

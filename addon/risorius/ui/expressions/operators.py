@@ -32,13 +32,13 @@ class Mixes(HandOperator):
         name="Strength", default=1.0, min=0.0, max=_MOST, subtype="FACTOR"
     )
     only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
-    flip: bpy.props.BoolProperty(name="Flip", description="Left for right")
+    flip: bpy.props.BoolProperty(name="Flip", description="Swap left and right")
     additive: bpy.props.BoolProperty(
-        name="Additive", description="Add to what the face does; nothing goes to rest"
+        name="Additive", description="Add the expression to the current pose"
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Only these regions are moved; none for all",
+        description="Move only these regions; choose none for all",
         items=region_items,
         options={"ENUM_FLAG"},
     )
@@ -179,7 +179,7 @@ class Blends(Mixes):
 
 # Blender loses a registered class that another one is derived from: the shelf's have bases too.
 class RISORIUS_OT_expression(Applies, Operator):
-    """Move the sliders to an expression. Ctrl: left for right, Shift: added to the face"""
+    """Move the sliders to an expression. Ctrl: swap left and right, Shift: add to the pose"""
 
     bl_idname = "risorius.expression"
     bl_label = "Expression"

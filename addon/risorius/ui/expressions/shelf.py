@@ -56,7 +56,7 @@ class _OfAsset(OperatorBase):
 
 
 class RISORIUS_OT_apply_pose_asset(_OfAsset, Applies, Operator):
-    """Move the sliders to the expression of a pose asset. Ctrl: left for right, Shift: added"""
+    """Move the sliders to the expression of a pose asset. Ctrl: swap sides, Shift: add"""
 
     bl_idname = "risorius.apply_pose_asset"
     bl_label = "Expression"

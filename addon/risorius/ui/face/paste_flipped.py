@@ -38,13 +38,13 @@ def _posed_controls(context: Context) -> ArmatureObject | None:
 
 
 class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
-    """Paste the copied pose left for right, with the sliders of the face"""
+    """Paste the copied pose with left and right swapped, with the sliders of the face"""
 
     bl_idname = "risorius.paste_pose_flipped"
     bl_label = "Paste Pose Flipped, with Sliders"
 
     selected: bpy.props.BoolProperty(
-        name="On Selected Only", description="Only onto bones that are selected", default=False
+        name="On Selected Only", description="Only onto selected bones", default=False
     )
 
     @classmethod

@@ -67,7 +67,7 @@ class _FileOperator(FaceOperator):
 
 
 class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
-    """Let another DNA file take this face's place; keys, edits and materials stay"""
+    """Replace the DNA file of this face; keys, edits and materials stay"""
 
     bl_idname = "risorius.replace_dna"
     bl_label = "Replace DNA"
@@ -80,7 +80,7 @@ class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
 
 
 class RISORIUS_OT_reload(_FileOperator, Operator):
-    """Read the face's file again; asks for it where it is no longer in its place"""
+    """Read the file of the face again; asks for the file if it has moved"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"

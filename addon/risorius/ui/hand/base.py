@@ -15,7 +15,7 @@ from ..common import FaceOperator, face_rig
 from ..words import of_error
 
 MOMENTS = (
-    ("NOW", "Current Frame", "Keys are inserted as Blender's auto-key and keying sets say"),
+    ("NOW", "Current Frame", "Insert keys as auto-key and the keying set of Blender require"),
     ("SELECTED", "Selected Keys", "At each frame that has a selected key of this face"),
 )
 
@@ -27,7 +27,7 @@ class HandOperator(FaceOperator):
     """
 
     at: bpy.props.EnumProperty(
-        name="At", description="Which frames are changed", items=MOMENTS, options={"SKIP_SAVE"}
+        name="At", description="Frames to change", items=MOMENTS, options={"SKIP_SAVE"}
     )
 
     def move(self, context: Context) -> Collection[str] | None:

@@ -34,7 +34,7 @@ def control_under_mouse(context: Context) -> str:
 
 
 class RISORIUS_OT_next_key(FaceOperator, Operator):
-    """Go to the next key of the control under the mouse, else of the face or of a region"""
+    """Go to the next key of the control under the mouse, or of the face or region"""
 
     bl_idname = "risorius.next_key"
     bl_label = "Next Key of This Control"
@@ -100,7 +100,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         items=(
             ("ALL", "All", "All sliders and the bones of head and eyes"),
             ("REGION", "Region", "The sliders of a region"),
-            ("SELECTED", "Selected Curves", "What is selected in the animation editors"),
+            ("SELECTED", "Selected Curves", "Curves that are selected in the animation editors"),
             ("FAVOURITES", "Favourites", "The sliders with a star"),
         ),
         options={"SKIP_SAVE"},
@@ -206,7 +206,7 @@ def proposed_range(context: Context) -> tuple[int, int]:
 
 
 class RISORIUS_OT_tweak(FaceOperator, Operator):
-    """Tweak a range of frames in a layer of its own, which touches no key; again: end the tweak"""
+    """Tweak a range of frames in a layer of its own; keys stay; press again to end the tweak"""
 
     bl_idname = "risorius.tweak"
     bl_label = "Tweak over a Range"

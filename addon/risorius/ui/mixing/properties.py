@@ -20,7 +20,7 @@ def _changed(_self: bpy.types.PropertyGroup, given: bpy.types.Context) -> None:
 
 
 _SHARE = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "update": _changed}
-_HERE = "How much of this region is this face's; what is left is as on the whole"
+_HERE = "Share of this face in this region; the rest follows the whole mix"
 
 
 class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
@@ -28,7 +28,7 @@ class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
 
     path: bpy.props.StringProperty(name="File", subtype="FILE_PATH")
     share: bpy.props.FloatProperty(
-        name="Share", description="How much of the whole is this face's", default=1.0, **_SHARE
+        name="Share", description="Share of this face in the whole mix", default=1.0, **_SHARE
     )
     show_regions: bpy.props.BoolProperty(
         name="Regions", description="Take some regions from this face", default=False

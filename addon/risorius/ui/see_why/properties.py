@@ -27,7 +27,7 @@ class RISORIUS_PG_why(bpy.types.PropertyGroup):
 
     control: bpy.props.StringProperty(
         name="Control",
-        description="The slider that is looked at: its reach, its correctives, it alone",
+        description="Slider to examine: its reach, its correctives, solo",
         search=_labels,
         search_options={"SORT"},
     )

@@ -32,9 +32,9 @@ from . import shown
 
 WAYS = (
     ("CHOSEN", "Control or Expression", "What is chosen"),
-    ("NAME", "By Its Name", "What its name says, as for keys of which nobody says anything"),
+    ("NAME", "By Its Name", "Guess from the name of the key"),
     ("OWN", "Control of Its Own", "A new control with the name of the key"),
-    ("NOTHING", "Leave Out", "The rig does without it"),
+    ("NOTHING", "Leave Out", "Leave the key out of the rig"),
 )
 _AT_ONCE = 6  # pictures after which the sidebar is drawn again
 
@@ -97,7 +97,7 @@ class Says(OfHead):
 
 
 class RISORIUS_OT_assign_shape_key(Says, Operator):
-    """Say what a shape key becomes when a rig is made of this head"""
+    """Assign a control or expression to a shape key of this head"""
 
     bl_idname = "risorius.assign_shape_key"
     bl_label = "Assign Shape Key"
@@ -147,7 +147,7 @@ def fill_choices() -> None:
 
 
 class RISORIUS_OT_choose_shape_key(Says, Operator):
-    """Look for the control or the expression that this shape key is, by its name"""
+    """Search the control or expression for this shape key by name"""
 
     bl_idname = "risorius.choose_shape_key"
     bl_label = "Choose a Control or Expression"
@@ -181,7 +181,7 @@ class RISORIUS_OT_select_shape_key(OfHead, Operator):
 
 
 class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
-    """Write what you said of the shape keys into a file, for other heads and for risorius author"""
+    """Save the assignments of shape keys to a file, for other heads and for risorius author"""
 
     bl_idname = "risorius.save_shape_key_names"
     bl_label = "Save Names"
@@ -190,7 +190,8 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
     filename_ext = ".toml"
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
     use_all: bpy.props.BoolProperty(
-        name="All Keys", description="Also what the names of keys say, to be edited as a text"
+        name="All Keys",
+        description=("Include guesses from names, so that you can edit them as text"),
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -215,7 +216,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Take what a file says of shape keys: one that was saved here, or that of risorius author"""
+    """Load assignments of shape keys from a file of this list or of risorius author"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"
@@ -245,18 +246,18 @@ class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
 
 
 class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
-    """Draw the pictures of the shape keys of this head, and of what they are; Esc ends it"""
+    """Draw pictures of the shape keys of this head and of their controls; Esc cancels"""
 
     bl_idname = "risorius.shape_key_pictures"
     bl_label = "Draw Pictures"
     bl_options = set()
 
     again: bpy.props.BoolProperty(
-        name="All Anew", description="Also pictures that are there", options={"SKIP_SAVE"}
+        name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
     )
     use_choices: bpy.props.BoolProperty(
         name="What Can Be Chosen",
-        description="Also what no key here is, for the list of Choose",
+        description="Include controls without a key in the list of Choose",
         options={"SKIP_SAVE"},
     )
 

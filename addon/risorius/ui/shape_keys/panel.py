@@ -33,7 +33,7 @@ class RISORIUS_UL_shape_key_names(UIList):
     """One line per shape key: its picture, its name, what it becomes; unknown ones first."""
 
     only_unknown: bpy.props.BoolProperty(
-        name="Only Unknown Names", description="Show only the shape keys that no name explains"
+        name="Only Unknown Names", description="Show only shape keys with unknown names"
     )
 
     def draw_item(

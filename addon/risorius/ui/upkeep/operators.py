@@ -30,15 +30,13 @@ def override_trouble(rig: ArmatureObject | None) -> str:
 
 
 class RISORIUS_OT_make_override(Operator):
-    """Make a linked face, or an override of one that stands still, ready to animate"""
+    """Make a linked face or its override ready to animate"""
 
     bl_idname = "risorius.make_override"
     bl_label = "Make Override"
     bl_options = {"REGISTER", "UNDO"}
 
-    shapes: bpy.props.EnumProperty(
-        name="Shapes", description="How its shapes are moved", items=SHAPES
-    )
+    shapes: bpy.props.EnumProperty(name="Shapes", description="Mode of its shapes", items=SHAPES)
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -74,7 +72,7 @@ class RISORIUS_OT_make_override(Operator):
 
 
 class RISORIUS_OT_bring_back(Operator):
-    """Put deleted parts of the active face, which are still in the file, back into the scene"""
+    """Restore deleted parts of the active face that are still in the file"""
 
     bl_idname = "risorius.bring_back"
     bl_label = "Bring Back Deleted Parts"
