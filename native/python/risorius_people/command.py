@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius sample build: a free person to begin with."""
+"""risorius sample build: make a free sample person."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _rig(spec: str | None, joints: int | None) -> tuple[RigOptions | None, CorrectiveOptions]:
-    """What the rig is to be, None without joints, and which correctives are looked for."""
+    """The options of the joint fit (None: no joints) and of the search for correctives."""
     rig, correctives = RIG, NO_SEARCH
     if spec == "full":
         with resources.as_file(resources.files("risorius_people") / "full.toml") as path:

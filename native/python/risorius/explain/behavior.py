@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls that are on, correctives, networks, setups, channels and maps."""
+"""Active controls, correctives, networks, setups, channels and maps."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ Facts = dict[str, Any]
 def table_hits(
     table: risorius.Conditionals, rows: int, inputs: Doubles
 ) -> dict[int, list[tuple[int, Facts]]]:
-    """The rows of a table of conditionals that count for some inputs.
+    """The rows of a conditional table that match some inputs.
 
     Args:
         table: of the face.
-        rows: how many leading rows are used.
-        inputs: float64[n], values of what input_indices count.
+        rows: number of leading rows in use.
+        inputs: float64[n], by input index.
 
     Returns:
-        Output -> list of (input, its value, the interval and what the row gives).
+        Output -> list of (input, its value, the interval and the row's result).
     """
     out: dict[int, list[tuple[int, Facts]]] = {}
     matched = None
     for row in range(rows):
         pair = int(table.input_indices[row]), int(table.output_indices[row])
         if pair == matched:
-            continue  # within a run only the first row that holds counts
+            continue  # in a run only the first matching row counts
         matched = None
         low, high = sorted((float(table.from_values[row]), float(table.to_values[row])))
         value = float(inputs[pair[0]])
@@ -54,13 +54,13 @@ def table_hits(
 def explain_raw(
     dna: risorius.Dna, raw: Doubles, rest: Doubles, gui: Doubles | None, names: ControlNames
 ) -> list[Facts]:
-    """Raw controls that are not at rest, and the GUI controls that made them.
+    """Raw controls that do not rest, and the GUI controls that set them.
 
     Args:
         dna: the face.
         raw: float64[raw controls].
         rest: float64[raw controls], at rest.
-        gui: float64[GUI controls]; None: the raw controls were given themselves.
+        gui: float64[GUI controls]; None: the raw controls were set directly.
         names: of the controls.
     """
     hits: dict[int, list[tuple[int, Facts]]] = {}
@@ -89,7 +89,7 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads rest there.
+    """Controls that something reads at a LOD; unread correctives rest there.
 
     Args:
         dna: the face.
@@ -117,7 +117,7 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Correctives that fire, those that lack one factor, and those that nothing reads.
+    """Correctives that fire, correctives that lack one factor, and unread ones.
 
     Args:
         dna: the face.
@@ -137,7 +137,7 @@ def explain_correctives(
         if controls[output] != 0:
             fires.append(facts)
         elif not missing:
-            reason = "what it hangs on goes in a circle" if output in used else "nothing reads it"
+            reason = "it depends on itself" if output in used else "nothing reads it"
             unread.append(facts | {"reason": reason})
         elif len(missing) == 1 and len(set(columns)) > 1 and output in used:
             lacking.append(_near_miss(facts, missing[0], names))
@@ -245,7 +245,7 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twists and swings that are not at rest: how far they turn, in degrees, and which joints.
+    """Twist and swing setups that do not rest: their angles in degrees, and their joints.
 
     Args:
         dna: the face.
@@ -283,7 +283,7 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
 
 
 def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
-    """Angles in degrees of the part about the axis and of what remains."""
+    """Angles in degrees of the twist about the axis and of the swing."""
     axis = min(axis, 2)
     about, w = float(q[axis]), float(q[3])
     rest = math.hypot(*(float(q[a]) for a in range(3) if a != axis))
@@ -301,7 +301,7 @@ def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
 def explain_shapes(
     dna: risorius.Dna, values: Doubles, controls: Doubles, lod: int, names: ControlNames
 ) -> list[Facts]:
-    """Blend shape channels that are on and the control of each, the largest value first.
+    """Active blend shape channels and the control of each, the largest value first.
 
     Args:
         dna: the face.
@@ -339,7 +339,7 @@ def explain_maps(
     lod: int,
     names: ControlNames,
 ) -> list[Facts]:
-    """Animated maps that are on, the one farthest from its value at rest first.
+    """Active animated maps, the one farthest from its value at rest first.
 
     Args:
         dna: the face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint matrix of one face twice: before an edit and after it."""
+"""The joint matrix of one face before and after an edit."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Headings and captions: what one sees, in a sentence, for the page and the sheet alike."""
+"""Headings and captions of the drawings, for the page and the sheet."""
 
 from __future__ import annotations
 
