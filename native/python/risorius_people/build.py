@@ -84,7 +84,7 @@ def rounded(values: Floats, step: float) -> Floats:
     """`values` rounded to multiples of a step, float64.
 
     Args:
-        values: of any shape.
+        values: values of any shape.
         step: above 0.
     """
     return np.round(np.asarray(values, np.float64) / step) * step

@@ -82,7 +82,7 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
     """The character of a DNA file, compiled or from the user's cache of compiled faces.
 
     Args:
-        path: of the DNA file.
+        path: path of the DNA file.
         quaternions: rotations of joints are quaternions, otherwise Euler angles in the file's unit.
 
     Raises:

@@ -27,7 +27,7 @@ def render(before: Facts, after: Facts, kind: str, dpi: int) -> bytes:
         before: the face with its old joint groups.
         after: with the new ones.
         kind: "png" or "svg".
-        dpi: of the images.
+        dpi: resolution of the images.
 
     Returns:
         The bytes of the picture.

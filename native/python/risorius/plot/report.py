@@ -53,9 +53,9 @@ def render(
     """The page as HTML in UTF-8.
 
     Args:
-        facts: of the new face.
-        levels: of each level of detail.
-        rows: of each expression.
+        facts: facts of the new face.
+        levels: one row per LOD.
+        rows: one row per expression.
         worst: the expressions to draw, with joints only.
         dpi: dots per inch of its pictures.
     """
