@@ -148,7 +148,7 @@ def prepared(
             start=float(times[0]) if times.size else clip.start,
         )
     if not clip.frame_count:
-        raise ArgumentError(f"a clip with frames was expected, found {found}, of them 0 asked for")
+        raise ArgumentError(f"a clip with frames was expected, found {found}, 0 of them requested")
     return with_head_turns(clip, face)
 
 

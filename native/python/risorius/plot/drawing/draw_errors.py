@@ -103,4 +103,4 @@ def draw(
     ramp = colors(np.linspace(0, most, 256), most)[None]
     scale.imshow(ramp, extent=(0, most, 0, 1), aspect="auto")
     scale.set_yticks([])
-    scale.set_xlabel("mm from what was asked for", color=MUTED)
+    scale.set_xlabel("mm from the requested shape", color=MUTED)
