@@ -125,7 +125,7 @@ void bind_writing(DnaClass& c) {
         return std::make_shared<Dna>(
             unwrap(unlocked([&] { return dna::from_json(utf8, limits); })));
       },
-      py::arg("text"), py::arg("limits") = dna::Limits{}, "What to_json wrote.");
+      py::arg("text"), py::arg("limits") = dna::Limits{}, "Reads the output of to_json.");
 }
 
 // "1.0" as two 16-bit halves.

@@ -56,7 +56,7 @@ void bind_report(py::module_& m) {
       .def_property_readonly("expression",
                              [](const LargestChange& s) { return to_python(s.expression); })
       .def_readonly("lod", &LargestChange::lod);
-  py::class_<RegroupReport> report(m, "RegroupReport", "What regroup did.");
+  py::class_<RegroupReport> report(m, "RegroupReport", "The result of regroup.");
   report.def_readonly("before", &RegroupReport::before)
       .def_readonly("after", &RegroupReport::after)
       .def_readonly("regions", &RegroupReport::regions)

@@ -378,7 +378,8 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
     if (!read) return read;
     if (out_times != nullptr && done > 0 && out_times[done] <= out_times[done - 1]) {
       return fail(ErrorCode::kInvalidValue, "blocks[" + std::to_string(block) + "].times",
-                  "times after those of the block before were expected", blocks_[block].offset);
+                  "times after the last time of the previous block were expected",
+                  blocks_[block].offset);
     }
     at = until;
   }

@@ -82,7 +82,7 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
     const std::uint64_t end = is_size ? r_.position() + mark : mark;
     if (end < r_.position() || end > layer_end) {
       r_.fail_at(at, ErrorCode::kTruncated,
-                 "the element is said to end at byte " + std::to_string(end) +
+                 "the element claims to end at byte " + std::to_string(end) +
                      ", its layer ends at byte " + std::to_string(layer_end));
       break;
     }

@@ -321,7 +321,7 @@ def assemble(
         person: the person to make.
     """
     base = with_eyeballs(source.base_mesh())
-    say("reading 52 ARKit units and the further ones")
+    say("reading 52 ARKit units and further units")
     body = Body(source, base, person)
     positions, joints, units = body.positions, body.joints, body.units
     places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]

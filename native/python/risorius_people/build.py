@@ -84,7 +84,7 @@ def rounded(values: Floats, step: float) -> Floats:
     """`values` rounded to multiples of a step, float64.
 
     Args:
-        values: of any shape.
+        values: values of any shape.
         step: above 0.
     """
     return np.round(np.asarray(values, np.float64) / step) * step
@@ -180,7 +180,7 @@ def search_correctives(dna: Dna, options: CorrectiveOptions, steps: Steps) -> Dn
     """
     if not options.most and not options.together:
         return dna
-    steps.at(_FIT_BEGINS, "looking for what goes wrong where expressions meet")
+    steps.at(_FIT_BEGINS, "searching for errors of combined expressions")
     found = find_correctives(dna, options, steps.share_of(_FIT_BEGINS, _SEARCH_ENDS))
     steps.say(f"{len(found.correctives)} correctives found in {found.looked_at} pairs and triples")
     return add_correctives(dna, found.skin, [(c.controls, c.shape) for c in found.correctives])
@@ -211,16 +211,16 @@ def joint_face(
     joints = options.fit.joints
     like = references.shipped() if options == RIG else references.kept(options)
     if like is None and man is None:
-        steps.at(begins, f"finding {joints} joints, weights and levels of detail")
+        steps.at(begins, f"fitting {joints} joints, weights and LODs")
         rig = make_joint_rig(dna, options, steps.share_of(begins, ends))
         references.keep(options, rig.reference)
         return rig.dna
     if like is None and man is not None:
-        steps.at(begins, f"finding {joints} joints that all people have (once)")
+        steps.at(begins, f"fitting the {joints} joints of all people (once)")
         like = find_reference(man(), options, steps.share_of(begins, _REFIT_BEGINS))
         begins = _REFIT_BEGINS
         references.keep(options, like)
-    steps.at(begins, f"finding what {joints} joints do here")
+    steps.at(begins, f"fitting the motions of {joints} joints")
     return make_joint_rig(dna, options, steps.share_of(begins, ends), like).dna
 
 
@@ -332,7 +332,7 @@ def _correct_again(making: _Making) -> None:
     """Search again after the fit: errors of joints and shapes add up in combined expressions."""
     if not making.corrects_again:
         return
-    making.steps.at(_AGAIN_BEGINS, "looking once more at what joints and shapes do together")
+    making.steps.at(_AGAIN_BEGINS, "searching again for errors of joints and shapes together")
     tell = making.steps.share_of(_AGAIN_BEGINS, 1.0)
     making.dna = correct_again(making.dna, making.shapes, making.correctives, tell)
     making.dna = within_deltas(making.dna, making.shapes).dna

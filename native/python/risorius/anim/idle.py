@@ -202,7 +202,7 @@ def make_blinks(
         length: seconds to fill.
         life: their frequency.
         loop: the end must fit the beginning, so the eyes are open at both.
-        saccades: of the same face; some of the large ones trigger a blink.
+        saccades: saccades of the same face; some of the large ones trigger a blink.
     """
     dice = _Dice(seed, 1)
     wanted = []

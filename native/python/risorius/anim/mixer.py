@@ -213,7 +213,7 @@ class Mixer:
         """Fire every event with the name of a reaction; returns their number.
 
         Args:
-            events: of a clip; an event's value is the strength if it is a number.
+            events: events of a clip; an event's value is the strength if it is a number.
             offset: seconds added to the times of the events.
         """
         count = 0

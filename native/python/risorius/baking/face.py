@@ -82,7 +82,7 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
     """The character of a DNA file, compiled or from the user's cache of compiled faces.
 
     Args:
-        path: of the DNA file.
+        path: path of the DNA file.
         quaternions: rotations of joints are quaternions, otherwise Euler angles in the file's unit.
 
     Raises:
@@ -148,7 +148,7 @@ def prepared(
             start=float(times[0]) if times.size else clip.start,
         )
     if not clip.frame_count:
-        raise ArgumentError(f"a clip with frames was expected, found {found}, of them 0 asked for")
+        raise ArgumentError(f"a clip with frames was expected, found {found}, 0 of them requested")
     return with_head_turns(clip, face)
 
 

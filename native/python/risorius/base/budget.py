@@ -81,6 +81,6 @@ def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
     if not count <= left:  # also of NaN
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "
-            f"at most {most:,} in all were expected of what has this size"
+            f"at most {most:,} in total were expected for this size"
         )
     return left - int(count)

@@ -37,7 +37,7 @@ def whole(value: object, low: int, high: int = MOST) -> int:
     """An integer from a file or a caller.
 
     Args:
-        value: of any type; true and false do not count as numbers.
+        value: a value of any type; true and false do not count as numbers.
         low: smallest allowed value.
         high: largest allowed value.
 
@@ -58,7 +58,7 @@ def finite(
     """A finite number from a file or a caller.
 
     Args:
-        value: of any type; true and false do not count as numbers.
+        value: a value of any type; true and false do not count as numbers.
         low: smallest allowed value.
         high: largest allowed value.
         above: exclude low itself.
@@ -113,7 +113,7 @@ def text(value: object) -> str:
     """A text from a file.
 
     Args:
-        value: of any type.
+        value: a value of any type.
 
     Raises:
         GivenError: not a text, or empty, or with a zero byte, which no name may have.
@@ -127,7 +127,7 @@ def flag(value: object) -> bool:
     """A truth value from a file.
 
     Args:
-        value: of any type.
+        value: a value of any type.
 
     Raises:
         GivenError: neither true nor false.
@@ -141,7 +141,7 @@ def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
     """A list from a file.
 
     Args:
-        value: of any type.
+        value: a value of any type.
         of: checks and returns one item.
 
     Raises:
@@ -156,9 +156,9 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
     """An argument of a function, checked by `whole` or `finite`.
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         check: `whole` or `finite`.
-        value: of any type.
+        value: a value of any type.
         low: smallest allowed value.
         high: largest allowed value.
 
@@ -175,7 +175,7 @@ def shown(value: object) -> str:
     """A value as errors show it, shortened if it is long.
 
     Args:
-        value: of any type.
+        value: a value of any type.
     """
     if isinstance(value, list | tuple | dict):
         return "a table" if isinstance(value, dict) else "a list"

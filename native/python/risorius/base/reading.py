@@ -23,7 +23,7 @@ class ReadingError(RisoriusError):
     """A file that is larger than its kind may be, or that has no end.
 
     Attributes:
-        name: of the file.
+        name: name of the file.
         what: the expected and the found value.
     """
 
@@ -38,7 +38,7 @@ def read_file(path: str | os.PathLike[str], most: int, *, found: bool = False) -
     """The bytes of a file, after a check of its size.
 
     Args:
-        path: of the file.
+        path: path of the file.
         most: largest number of bytes.
         found: the name comes from another file or a folder, not from a user; then a pipe is
             refused, because reading it could wait for ever.
@@ -61,7 +61,7 @@ def open_file(path: str | os.PathLike[str]) -> BufferedReader:
     """Open a file or a pipe for reading.
 
     Args:
-        path: of the file.
+        path: path of the file.
 
     Raises:
         ReadingError: a device, which has no end.
@@ -80,7 +80,7 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
     Args:
         file: open for reading.
         most: largest number of bytes left.
-        name: of the stream, for the error.
+        name: name of the stream, for the error.
 
     Raises:
         ReadingError: more are left.

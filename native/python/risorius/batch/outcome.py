@@ -12,7 +12,7 @@ class Outcome:
     """A finished job, or one that failed and will not be tried again.
 
     Attributes:
-        name: of the job.
+        name: name of the job.
         error: the reason of the failure; "" if it succeeded.
         stamp: hash of its inputs, see stamp().
         facts: of Measure, and the seconds for reading, evaluating and writing.

@@ -60,7 +60,7 @@ def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
 
     Args:
         plan: all jobs.
-        journal: of earlier runs.
+        journal: journal of earlier runs.
         report: receives the finished ones.
     """
     out = []

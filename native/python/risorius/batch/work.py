@@ -117,7 +117,7 @@ def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
     Args:
         job: its paths must exist on the machine that runs this.
         threads: number of threads for the evaluation.
-        version: of the Risorius that sent the job, if it may differ.
+        version: version of the Risorius that sent the job, if it may differ.
     """
     if version not in (None, risorius.__version__):
         return Outcome(

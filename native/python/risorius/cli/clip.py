@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "clip",
         help="animation of other software as clips of a rig's controls",
         description="Reads Live Link Face takes, tables and JSON of named curves, mouth shapes of "
-        "Rhubarb, Papagayo and Moho, glTF and FBX; what a curve moves is said by a mapping.",
+        "Rhubarb, Papagayo and Moho, glTF and FBX; a mapping assigns curves to controls.",
     )
     commands = parser.add_subparsers(dest="clip_command", required=True)
     _add_convert(commands)

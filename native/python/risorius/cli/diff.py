@@ -29,7 +29,7 @@ def same_but_for(a: str, b: str) -> Difference | None:
     left, right = (np.frombuffer(one, np.uint8, short) for one in data)
     other = left != right
     first = int(np.argmax(other)) if other.any() else short
-    text = f"the same content, but other bytes from byte {first} on, in what no layer reads"
+    text = f"the same content, but other bytes from byte {first} on, in a part that no layer reads"
     return Difference("file", "bytes", text)
 
 

@@ -44,7 +44,7 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
     Args:
         text: typed by a user.
-        names: of all controls.
+        names: names of all controls.
 
     Raises:
         UnknownControlError: no meaning, or several; the message lists them.
@@ -94,8 +94,8 @@ def named(names: Sequence[str], index: int, kind: str) -> str:
     """The name of an element, or for example "joint 7" if the file has no name.
 
     Args:
-        names: of the file.
-        index: of the element; it may lie beyond the names.
+        names: names in the file.
+        index: index of the element; it may lie beyond the names.
         kind: kind of element, e.g. "joint".
     """
     return (names[index] if index < len(names) else "") or f"{kind} {index}"

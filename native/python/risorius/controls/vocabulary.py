@@ -162,7 +162,7 @@ def find(name: str, order: Sequence[str] | None = None) -> Meaning | None:
     """The meaning of a name; None if no vocabulary knows it.
 
     Args:
-        name: of a shape or a curve; may have anything before its last dot.
+        name: name of a shape or a curve; may have anything before its last dot.
         order: vocabularies as returned by `leading`; the first that knows the name decides. None:
             ARKit in any spelling, then the exact spelling of any vocabulary, then any spelling.
     """

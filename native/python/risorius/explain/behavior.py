@@ -26,7 +26,7 @@ def table_hits(
     """The rows of a conditional table that match some inputs.
 
     Args:
-        table: of the face.
+        table: table of the face.
         rows: number of leading rows in use.
         inputs: float64[n], by input index.
 
@@ -61,7 +61,7 @@ def explain_raw(
         raw: float64[raw controls].
         rest: float64[raw controls], at rest.
         gui: float64[GUI controls]; None: the raw controls were set directly.
-        names: of the controls.
+        names: names of the controls.
     """
     hits: dict[int, list[tuple[int, Facts]]] = {}
     if gui is not None:
@@ -121,9 +121,9 @@ def explain_correctives(
 
     Args:
         dna: the face.
-        controls: float64[controls], of a pose.
+        controls: float64[controls] of a pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     rows = np.asarray(dna.psds.rows)
     used = used_controls(dna, lod)
@@ -189,9 +189,9 @@ def explain_networks(
 
     Args:
         dna: the face.
-        controls: float64[controls], of a pose.
+        controls: float64[controls] of a pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     ml = dna.machine_learned_behavior
     regions = _regions(dna)
@@ -249,8 +249,8 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
 
     Args:
         dna: the face.
-        controls: float64[controls], of a pose.
-        names: of the controls.
+        controls: float64[controls] of a pose.
+        names: names of the controls.
     """
     layer = dna.twist_swing_behavior
     out = []
@@ -305,10 +305,10 @@ def explain_shapes(
 
     Args:
         dna: the face.
-        values: float64[channels], of a pose.
-        controls: float64[controls], of the same pose.
+        values: float64[channels] of a pose.
+        controls: float64[controls] of the same pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     channels = dna.blend_shape_channels
     count = _count(channels, lod)
@@ -343,11 +343,11 @@ def explain_maps(
 
     Args:
         dna: the face.
-        values: float64[maps], of a pose.
+        values: float64[maps] of a pose.
         at_rest: float64[maps].
-        controls: float64[controls], of the same pose.
+        controls: float64[controls] of the same pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     table = dna.animated_maps.conditionals
     hits = table_hits(table, _count(dna.animated_maps, lod), controls)

@@ -32,9 +32,9 @@ def contributions(
 
     Args:
         dna: the face.
-        pose: of its rig, with Euler angles.
+        pose: pose of its rig, with Euler angles.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
 
     Returns:
         Joint -> source -> float64[9], in the units of the file.
@@ -246,9 +246,9 @@ def explain_joints(
 
     Args:
         dna: the face.
-        pose: of its rig, with Euler angles.
+        pose: pose of its rig, with Euler angles.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     parts = contributions(dna, pose, lod, names)
     convention = Convention.of(dna)

@@ -26,7 +26,7 @@ def explain_solvers(
         rig: compiled from dna.
         controls: float64[controls], as evaluated.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     mapping = dna.rbf_behavior.lod_solver_mapping
     listed = mapping[lod].tolist() if lod < len(mapping) else []

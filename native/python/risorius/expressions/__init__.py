@@ -95,7 +95,7 @@ def get(name: str, edition: int = EDITION) -> Expression:
     """One of Risorius' own expressions.
 
     Args:
-        name: of the expression.
+        name: name of the expression.
         edition: 1 for the earlier, milder ones; otherwise the current ones.
 
     Raises:

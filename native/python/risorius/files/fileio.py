@@ -40,7 +40,7 @@ def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
     receive the bytes directly.
 
     Args:
-        path: of a file in an existing folder.
+        path: path of a file in an existing folder.
         sweep: remove hidden files of killed processes; switch it off for thousands of files in one
             folder and call sweep() once.
 
@@ -79,7 +79,7 @@ def write_bytes(path: _Path, data: ReadableBuffer) -> None:
     """Write a file atomically, see replacing().
 
     Args:
-        path: of a file in an existing folder.
+        path: path of a file in an existing folder.
         data: its bytes.
 
     Raises:
@@ -93,7 +93,7 @@ def write_text(path: _Path, text: str) -> None:
     """Write a text file atomically, see replacing().
 
     Args:
-        path: of a file in an existing folder.
+        path: path of a file in an existing folder.
         text: written as UTF-8 with unchanged line ends.
 
     Raises:
@@ -137,7 +137,7 @@ def staging(path: _Path) -> Iterator[Path]:
     folder. Devices and pipes are returned unchanged.
 
     Args:
-        path: of a file in an existing folder.
+        path: path of a file in an existing folder.
 
     Raises:
         OSError: writing is impossible there, or the block wrote no file; the error names path.

@@ -134,7 +134,7 @@ def _tokens(blocks: Ints, order: Ints, colour: int) -> tuple[Ints, ...]:
 
     Args:
         blocks: int[n, 64].
-        order: of the blocks in the scan.
+        order: order of the blocks in the scan.
         colour: 0 for brightness, 1 for colour: tables 2 * colour and 2 * colour + 1.
     """
     steady = np.diff(blocks[:, 0], prepend=0)

@@ -211,7 +211,7 @@ class Scene:
         settings: GlobalSettings, or None.
         objects: id -> record.
         parents: id -> (parent's id, property or ""), in the file's order.
-        budget: of the file.
+        budget: budget of the file.
         notes: sentences about the reading.
     """
 

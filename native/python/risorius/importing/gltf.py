@@ -103,7 +103,7 @@ class Document:
         Repeated calls return the same array, because a thousand channels may share one.
 
         Args:
-            index: of the accessor, as in the file.
+            index: index of the accessor, as in the file.
             place: place of the index, for errors.
 
         Raises:
@@ -145,7 +145,7 @@ class Document:
         file declares them normalised.
 
         Args:
-            index: of the accessor, as in the file.
+            index: index of the accessor, as in the file.
             place: place of the index, for errors.
             kind: "SCALAR", "VEC2", "VEC3", "VEC4" or "MAT4".
             components: allowed component types.
@@ -260,7 +260,7 @@ class Document:
         """The bytes of a buffer view, such as a picture.
 
         Args:
-            index: of the buffer view, as in the file.
+            index: index of the buffer view, as in the file.
             place: place of the index, for errors.
 
         Raises:
@@ -330,7 +330,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
     """A GLB, the binary form of glTF.
 
     Args:
-        path: of the file; its buffers are in the same folder, and errors name it.
+        path: path of the file; its buffers are in the same folder, and errors name it.
         data: the whole file.
         budget: limits memory and work; None: by the size of the file.
 
@@ -385,7 +385,7 @@ def open_gltf(
     """A glTF from parsed JSON.
 
     Args:
-        path: of the file; its buffers are in the same folder, and errors name it.
+        path: path of the file; its buffers are in the same folder, and errors name it.
         document: the parsed JSON.
         binary: the binary chunk of a GLB, or None.
         budget: limits memory and work; None: the budget of a small file.

@@ -149,7 +149,7 @@ class Reader:
         """A Take of curves; frames whose time does not ascend are dropped and noted.
 
         Args:
-            names: of the curves, each once.
+            names: names of the curves, each once.
             rows: float[controls, frames]; NaN for missing values.
             times: float64[frames], seconds.
             rate: frames per second; None: inferred from the times.
@@ -176,7 +176,7 @@ def first_key(table: Mapping[str, object], keys: Sequence[str]) -> str | None:
     """The first of some keys that a table has, or None.
 
     Args:
-        table: of the JSON.
+        table: table of the JSON.
         keys: in the order of preference.
     """
     return next((key for key in keys if key in table), None)

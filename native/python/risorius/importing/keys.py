@@ -78,7 +78,7 @@ def on_one_clock(
 
     Args:
         rate: frames per second, or None for no samples between keys.
-        budget: of the file.
+        budget: budget of the file.
 
     Returns:
         float64[frames] seconds; float64[curves, frames].

@@ -77,7 +77,7 @@ class Mapping:
     """The rows of a mapping, with full names.
 
     Attributes:
-        name: of the file, without suffix.
+        name: name of the file, without suffix.
         description: a sentence.
         rows: curve of the source -> {control: weight}. * in a name matches any text; * in its
             controls is replaced by that text. An empty row ignores the curve.

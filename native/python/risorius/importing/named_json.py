@@ -38,7 +38,7 @@ def parse(text: str, name: str) -> object:
     """The document in a JSON text.
 
     Args:
-        text: of the file.
+        text: content of the file.
         name: the file's name in errors.
 
     Raises:
@@ -94,7 +94,7 @@ def own_clip(reader: Reader, document: object) -> Take | None:
     """The layout of `importing.write_json`; None if the document has another one.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
@@ -149,7 +149,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
     layout.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
@@ -202,7 +202,7 @@ def neurosync(reader: Reader, document: object) -> Take | None:
     Returns None for another layout.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
@@ -237,7 +237,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
     Returns None for another layout.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
@@ -309,7 +309,7 @@ def curve_table(reader: Reader, document: object) -> Take | None:
     layout.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON; the keys other than "Name" are seconds.
 
     Raises:
@@ -336,7 +336,7 @@ def keyed_curves(reader: Reader, document: object) -> Take | None:
     Returns None if there are no such curves.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON; times are seconds.
 
     Raises:
@@ -399,7 +399,7 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
     Returns None for another layout.
 
     Args:
-        reader: of the file.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:

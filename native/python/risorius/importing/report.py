@@ -13,7 +13,7 @@ _WIDTH = 100
 class Report:
     """Attributes:
     source: the file, or another source of the curves.
-    kind: of file, one of `importing.KINDS`.
+    kind: kind of file, one of `importing.KINDS`.
     mapping: name of the mapping used.
     mapped: curve of the source -> controls it moves.
     unmapped: curves of the source that the mapping does not know.

@@ -50,7 +50,7 @@ def read_bytes(path: Path, *, found: bool = False) -> bytes:
     """The bytes of a file.
 
     Args:
-        path: of the file.
+        path: path of the file.
         found: another file names it, so that it may not be a pipe.
 
     Raises:
@@ -137,12 +137,12 @@ def make_clip(
     They are even if no frame is further than a microsecond from start + i / rate.
 
     Args:
-        names: of the curves, each once.
+        names: names of the curves, each once.
         curves: float[controls, frames].
         times: float64[frames], seconds, ascending.
         rate: frames per second; None: inferred from the times.
-        events: of the clip.
-        metadata: of the clip.
+        events: events of the clip.
+        metadata: metadata of the clip.
     """
     chosen = rate or frame_rate(times)
     start = float(times[0]) if times.size else 0.0

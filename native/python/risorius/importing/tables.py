@@ -127,7 +127,7 @@ def read_table(text: str, name: str) -> Table:
     Comments are skipped. A line "sep=;" sets the delimiter, as in Excel.
 
     Args:
-        text: of the file, with commas, semicolons or tabs between cells.
+        text: content of the file, with commas, semicolons or tabs between cells.
         name: the file's name in errors.
 
     Raises:

@@ -138,7 +138,7 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
     Accepts lower case, blanks, decimal commas and other separators than the tab.
 
     Args:
-        text: of the file.
+        text: content of the file.
         name: the file's name in errors.
 
     Raises:
@@ -165,7 +165,7 @@ def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
 
     Args:
         times: float64[rows], seconds.
-        shapes: of each row, from its time on; the last one marks the end.
+        shapes: shapes of each row, from its time on; the last one marks the end.
         name: the file's name in errors.
 
     Raises:
@@ -200,7 +200,7 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
     """Rhubarb's <rhubarbResult> with <mouthCue start end>, in seconds.
 
     Args:
-        text: of the file.
+        text: content of the file.
         name: the file's name in errors.
 
     Raises:
@@ -294,7 +294,7 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
     """Moho's switch data: MohoSwitch1, then lines with a frame, counted from 1, and a shape.
 
     Args:
-        text: of the file.
+        text: content of the file.
         name: the file's name in errors.
         rate: frames per second; None: from an FPS line, else DAT_RATE with a note.
 
@@ -378,7 +378,7 @@ def read_pgo(text: str, name: str) -> Take:
     """Papagayo's text file: voices with phrases with words with phonemes.
 
     Args:
-        text: of the file.
+        text: content of the file.
         name: the file's name in errors.
 
     Raises:
@@ -481,7 +481,7 @@ def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
     """The reader for a text that is neither JSON nor a table, or None.
 
     Args:
-        text: of the file.
+        text: content of the file.
         kind: one of `importing.KINDS` from the caller, or None.
     """
     head = text.lstrip()[:200]

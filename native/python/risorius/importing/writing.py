@@ -67,7 +67,7 @@ def write_text(text: str, path: str | os.PathLike[str]) -> None:
 
     Args:
         text: the new content, written as UTF-8.
-        path: of the file; links are followed.
+        path: path of the file; links are followed.
 
     Raises:
         OSError: the file cannot be written; the old content stays.

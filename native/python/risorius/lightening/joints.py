@@ -234,7 +234,7 @@ def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubl
     """The vertices of each joint, numbered over all meshes, and their weights.
 
     Args:
-        meshes: of the face.
+        meshes: meshes of the face.
         joints: number of joints.
     """
     vertices, owners, weights, first = [], [], [], 0

@@ -62,7 +62,7 @@ class Size:
 
         Args:
             dna: the face.
-            file_bytes: of its file.
+            file_bytes: size of its file.
             rig: compiled from it.
         """
         return cls(

@@ -56,7 +56,7 @@ def errors(
         before: one face.
         after: the other, with the same levels and meshes.
         rigs: compiled from them.
-        poses: of both.
+        poses: poses of both faces.
         told: called with the share of the work that is done.
     """
     levels = max(1, before.lod_count)

@@ -24,7 +24,7 @@ class Pose:
     """Controls of one pose.
 
     Attributes:
-        name: of the control, or of a corrective's controls joined by +.
+        name: name of the control, or of a corrective's controls joined by +.
         raw: float32[R].
         input: the raw control or corrective, as an index of the control vector.
         controls: number of raw controls in the pose.

@@ -70,7 +70,7 @@ class Roster(Generic[Key, Item]):
         """The record of a sender that was heard just now; None for an unknown one.
 
         Args:
-            key: of the sender.
+            key: key of the sender.
             now: seconds, of a monotonic clock.
         """
         place = self._places.get(key)

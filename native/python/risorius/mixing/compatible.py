@@ -148,7 +148,7 @@ def alike(one: object, other: object) -> bool:
 
     Args:
         one: an array, a text, a number, a list of parts, or an object with parts as attributes.
-        other: of the same kind.
+        other: a value of the same kind.
     """
     if isinstance(one, np.ndarray):
         return bool(one.tobytes() == np.asarray(other).tobytes())

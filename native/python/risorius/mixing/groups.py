@@ -26,7 +26,7 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
 
     Args:
         parents: compatible faces.
-        share: of the joints.
+        share: share of the joints.
     """
     groups = [list(p.joint_groups) for p in parents]
     if share.is_whole and all(alike(groups[0], own) for own in groups[1:]):

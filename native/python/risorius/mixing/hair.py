@@ -122,7 +122,7 @@ def nearest(points: Doubles, others: Doubles, count: int, budget: Budget) -> Int
         points: float64[n, 3].
         others: float64[m, 3].
         count: number of neighbours, from 1 to m.
-        budget: of the face.
+        budget: budget of the face.
 
     Raises:
         BudgetError: too many pairs for the face's size.

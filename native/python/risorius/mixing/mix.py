@@ -76,8 +76,8 @@ def mix_faces(
     Args:
         parents: compatible faces, see check_compatible; not changed.
         mix: their shares.
-        name: of the new face; None: from the parent with the largest share.
-        masks: of the first parent's regions, if known already.
+        name: name of the new face; None: from the parent with the largest share.
+        masks: masks of the first parent's regions, if known already.
 
     Returns:
         If one parent has all shares, the result equals it in every bit. Metadata and hair come from
@@ -197,7 +197,7 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
     Args:
         parents: meshes of one topology.
-        share: of its vertices.
+        share: share of its vertices.
     """
     first, weights = parents[0], share.weights
     out = copy.copy(first)
@@ -289,7 +289,7 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
 
     Args:
         dna: the first parent.
-        masks: of its regions.
+        masks: masks of its regions.
     """
     count = len(dna.joint_names)
     sums, held = np.zeros((count, len(REGIONS))), np.zeros(count)

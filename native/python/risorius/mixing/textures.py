@@ -43,7 +43,7 @@ def texture_folder(path: Path) -> Path:
     """The folder of a DNA file's textures.
 
     Args:
-        path: of the file.
+        path: path of the file.
     """
     return path.with_name(path.stem + "_textures")
 
@@ -57,7 +57,7 @@ def mix_textures(
         parents: compatible faces.
         paths: of their files.
         mix: their shares.
-        masks: of the first one's regions.
+        masks: masks of the first one's regions.
 
     Returns:
         File name -> bytes; and for images of the leading parent alone: name -> reason, see WHY.
@@ -98,7 +98,7 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
     """Refuse to overwrite images that do not belong to a face of this name.
 
     Args:
-        path: of the new DNA file; if it exists, its images may be replaced too.
+        path: path of the new DNA file; if it exists, its images may be replaced too.
         pictures: file names from the parents' metadata.
 
     Raises:

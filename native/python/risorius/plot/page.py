@@ -26,7 +26,7 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     """The page as HTML in UTF-8.
 
     Args:
-        facts: of the face.
+        facts: facts of the face.
         lod: the level to draw, from 0.
         dpi: dots per inch of its pictures.
     """
@@ -62,8 +62,8 @@ def section(
         name: the section's id.
         title: the heading.
         caption: a sentence or two under it.
-        height: of the drawing, inches.
-        dpi: of its pictures.
+        height: height of the drawing, inches.
+        dpi: resolution of its pictures.
         draw: draws on the canvas.
         after: HTML behind the drawing.
     """
@@ -118,7 +118,7 @@ def document(facts: Facts, sections: str, links: Sequence[tuple[str, str]]) -> s
     """The whole page.
 
     Args:
-        facts: of the face.
+        facts: facts of the face.
         sections: HTML from `section`.
         links: ids of the sections and the texts of their links.
     """

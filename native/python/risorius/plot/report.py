@@ -53,9 +53,9 @@ def render(
     """The page as HTML in UTF-8.
 
     Args:
-        facts: of the new face.
-        levels: of each level of detail.
-        rows: of each expression.
+        facts: facts of the new face.
+        levels: one row per LOD.
+        rows: one row per expression.
         worst: the expressions to draw, with joints only.
         dpi: dots per inch of its pictures.
     """
@@ -69,8 +69,8 @@ def render(
     with settings():
         sections = [
             section("errors", "Where joints alone are off",
-                    "The expressions with the largest errors at LOD 0, each at 1 and in the form "
-                    "that was asked for; what blend shapes add is not counted.",
+                    "The expressions with the largest errors at LOD 0, each at 1 and in its "
+                    "requested form; blend shape deltas are not counted.",
                     draw_errors.height(len(worst), WIDTH), dpi,
                     lambda canvas: draw_errors.draw(canvas, facts.dna, worst, most, dpi),
                     after=_expressions(rows)),

@@ -27,7 +27,7 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     """The sheet as the bytes of a PNG file.
 
     Args:
-        facts: of the face.
+        facts: facts of the face.
         lod: the level to draw, from 0.
         dpi: dots per inch.
     """

@@ -135,7 +135,7 @@ class Remap:
     """Ranges compiled for values in the order of given names.
 
     Args:
-        names: of the controls.
+        names: names of the controls.
         ranges: by name; names without a range keep their values.
 
     Attributes:

@@ -32,7 +32,7 @@ def compile_cached(
     without an error. Nothing is ever deleted; users may delete files.
 
     Args:
-        path: of a DNA file.
+        path: path of a DNA file.
         cache_dir: default is a folder among the user's caches; made if missing. If others may write
             to it, its files are checked like DNA files, see Rig.load: a hash finds damage, not
             forgery.

@@ -47,7 +47,7 @@ def regroup(
             region's joints.
         combinations: number of random poses that the report compares, in addition to each raw
             control at 1.
-        seed: of the random poses.
+        seed: seed of the random poses.
         timed: number of evaluations to time before and after; 0 for none.
 
     Returns:

@@ -175,7 +175,7 @@ def turned_joints(names: Sequence[str]) -> dict[int, tuple[str, float]]:
     """The joints that turn as neck and head, by their usual names in any letter case.
 
     Args:
-        names: of the file's joints.
+        names: names of the file's joints.
 
     Returns:
         Joint -> "neck" or "head", and its share of the rotation: `neck_01` and `neck_02` divide the

@@ -97,10 +97,10 @@ def structure(
     """The structure that a caller gave, or one made from its fields among the keywords.
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         given: the structure; None if it was not given.
         kind: its class.
-        keywords: of the call; may have others.
+        keywords: keywords of the call; may have others.
 
     Raises:
         ArgumentError: both the structure and some of its fields were given.
@@ -124,7 +124,7 @@ def check_keywords(
 
     Args:
         function: its name.
-        keywords: of the call.
+        keywords: keywords of the call.
         kinds: structures whose fields are valid keywords.
 
     Raises:

@@ -132,7 +132,7 @@ def nearer(
         begin: the pose at the begin.
         few: the pose with few controls.
         every: the pose with all controls.
-        pairs: of opposites.
+        pairs: pairs of opposites.
     """
     aim = drag.far(every) + BEHIND_MM
     if drag.far(few) <= aim:

@@ -65,7 +65,7 @@ def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int
     Args:
         places: float64[V, 3].
         surface: knows the axes.
-        size: of the mesh.
+        size: size of the mesh.
     """
     depth = places @ surface.front
     flat = places[:, [surface.side, surface.up]]
@@ -90,7 +90,7 @@ def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[n
         places: float64[V, 3].
         side: index of the axis from side to side.
         up: index of the upward axis.
-        size: of the mesh.
+        size: size of the mesh.
     """
     near = size / 300
     middle = (places[:, side].min() + places[:, side].max()) / 2

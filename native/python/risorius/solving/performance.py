@@ -51,7 +51,7 @@ def read_performance(
 
     Args:
         path: the file.
-        name: of the mesh in an Alembic file; None: the first that fits.
+        name: name of the mesh in an Alembic file; None: the first that fits.
         counts: numbers of vertices that fit, by mesh; None: any.
 
     Raises:

@@ -29,7 +29,7 @@ class Surface:
         rig: the compiled face.
         lod: the level of detail that is evaluated.
         mesh_indices: the meshes of that LOD, as indices into dna.meshes.
-        vertex_counts: of each mesh of the file.
+        vertex_counts: vertex counts of each mesh of the file.
         mm: millimetres in the file's unit.
         side, up: indices of the axis from side to side and of the vertical axis.
         front: float64[3], the direction of the face.
@@ -206,7 +206,7 @@ def numbers(name: str, values: npt.ArrayLike) -> Doubles:
     """A caller's numbers as float64[...].
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         values: numbers of any shape.
 
     Raises:
@@ -225,7 +225,7 @@ def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
     """A caller's integers as int64[...].
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         values: integers of any shape.
 
     Raises:
@@ -243,7 +243,7 @@ def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
     """A caller's numbers as float64[count].
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         values: one number for all, or one for each.
         count: the required number.
 

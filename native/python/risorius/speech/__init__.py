@@ -66,7 +66,7 @@ def speak(
         path: a WAV file, or any file that an ffmpeg on PATH can read.
         transcript: the spoken words in English, if known: the mouth is much better with it.
         rate: frames per second of the clip.
-        seed: of the blinks. The same file and arguments always give the same clip.
+        seed: seed of the blinks. The same file and arguments always give the same clip.
         intensity: scales mouth shapes, brows and nods; lips still close completely.
         blinks: add blinks.
         accents: let brows and head follow stressed syllables.

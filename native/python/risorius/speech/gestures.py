@@ -38,8 +38,8 @@ def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list
     """The times at which lids begin to fall: at a natural rate, moved to near pauses of speech.
 
     Args:
-        phonemes: of the voice; pauses are SIL.
-        duration: of the voice, seconds.
+        phonemes: phonemes of the voice; pauses are SIL.
+        duration: duration of the voice, seconds.
         seed: the same seed gives the same times.
 
     Returns:

@@ -330,7 +330,7 @@ def filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:
 
     Args:
         found: in order.
-        duration: of the sound, seconds.
+        duration: duration of the sound, seconds.
     """
     whole: list[Phoneme] = []
     place = 0.0

@@ -64,7 +64,7 @@ def openness(samples: Samples) -> Curve:
     """The opening of vowels from loudness: about 0.6 to 1.25 every OPENNESS_STEP, without jitter.
 
     Args:
-        samples: of the voice, at RATE.
+        samples: samples of the voice, at RATE.
 
     Returns:
         float64[n] in whole thousandths, so that text stores them exactly; the first value belongs
@@ -94,8 +94,8 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
     """The vowels that are louder, higher or longer than those around.
 
     Args:
-        phonemes: of the voice, in order.
-        samples: of the voice, at RATE.
+        phonemes: phonemes of the voice, in order.
+        samples: samples of the voice, at RATE.
         apart: least number of seconds between two accents.
     """
     levels, heights = loudness(samples), pitch(samples)

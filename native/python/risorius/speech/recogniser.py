@@ -83,7 +83,7 @@ class Recogniser:
         """The words with times, with silences between; None if the voice does not say them.
 
         Args:
-            samples: of a piece of a voice, at RATE.
+            samples: samples of a piece of a voice, at RATE.
             words: in the spoken order.
         """
         for kind in _ALIGNERS:
@@ -96,7 +96,7 @@ class Recogniser:
         """The phonemes of the words with times; None if the voice does not say them.
 
         Args:
-            samples: of a piece of a voice, at RATE.
+            samples: samples of a piece of a voice, at RATE.
             words: in the spoken order.
         """
         for kind in _ALIGNERS:
@@ -112,7 +112,7 @@ class Recogniser:
         For an inexact transcript: each word may be skipped, and other speech may precede any word.
 
         Args:
-            samples: of a piece of a voice, at RATE.
+            samples: samples of a piece of a voice, at RATE.
             words: in the spoken order.
         """
         decoder = self._decoder("one way")

@@ -45,7 +45,7 @@ def write(found: Sequence[Phoneme], name: str) -> str:
 
     Args:
         found: in order, without gaps.
-        name: of the file.
+        name: name of the file.
     """
     return textgrid(found) if suits_textgrid(name) else table(found)
 
@@ -99,7 +99,7 @@ def read(data: bytes, name: str) -> list[Phoneme]:
     """The phonemes of a file in either form, in order; gaps are silence.
 
     Args:
-        data: of the file, UTF-8, or UTF-16 with its byte order mark.
+        data: content of the file, UTF-8, or UTF-16 with its byte order mark.
         name: the file's name in errors.
 
     Raises:

@@ -28,7 +28,7 @@ class Place:
         """The place of a field within this one.
 
         Args:
-            name: of the field, appended after a dot; "": the same field.
+            name: name of the field, appended after a dot; "": the same field.
             what: prefix of each text there, after the prefix of this place.
         """
         field = ".".join(part for part in (self.field, name) if part)

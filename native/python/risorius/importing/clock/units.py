@@ -95,7 +95,7 @@ def time_name(header: str) -> TimeName | None:
     """The unit in a header of times such as "Time (ms)", "timestamp_us", "frame"; None: not a time.
 
     Args:
-        header: of a column, or a key of JSON.
+        header: header of a column, or a key of JSON.
     """
     brackets = _BRACKETS.search(header)
     if brackets is None:

@@ -22,7 +22,7 @@ class Packing:
     """The packing of a buffer view.
 
     Attributes:
-        name: of the extension.
+        name: name of the extension.
         table: the extension's table; buffer, byteOffset and byteLength locate the packed bytes.
         count, stride: rows, and bytes per row, after unpacking.
         mode, filter: from MODES and FILTERS.

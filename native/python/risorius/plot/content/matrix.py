@@ -84,7 +84,7 @@ def regrouped(dna: risorius.Dna, regions: Sequence[str]) -> tuple[Cells, list[Bl
 
     Args:
         dna: a rig.
-        regions: of each joint group.
+        regions: regions of each joint group.
 
     Returns:
         The cells, and the rectangle of each non-empty group, as the evaluator stores it.

@@ -67,8 +67,8 @@ def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
     """The region of most of the joints; on a tie the first one in REGIONS.
 
     Args:
-        indices: of joints; indices out of range are ignored.
-        regions: of every joint.
+        indices: indices of joints; indices out of range are ignored.
+        regions: regions of every joint.
     """
     votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
     named = [region for region in REGIONS[:-1] if votes[region]]

@@ -52,8 +52,8 @@ def height(count: int, width: float) -> float:
     """Inches for this number of pictures.
 
     Args:
-        count: of expressions.
-        width: of the canvas, inches.
+        count: number of expressions.
+        width: width of the canvas, inches.
     """
     return -(-max(count, 1) // COLUMNS) * (1.25 * width / COLUMNS + _HEAD) + _BAR
 
@@ -68,7 +68,7 @@ def draw(
         dna: has the axes.
         expressions: in drawing order.
         most: the error at the end of the scale, mm.
-        dpi: of the images.
+        dpi: resolution of the images.
     """
     if not expressions:
         canvas.say("No expression moves this face.")
@@ -103,4 +103,4 @@ def draw(
     ramp = colors(np.linspace(0, most, 256), most)[None]
     scale.imshow(ramp, extent=(0, most, 0, 1), aspect="auto")
     scale.set_yticks([])
-    scale.set_xlabel("mm from what was asked for", color=MUTED)
+    scale.set_xlabel("mm from the requested shape", color=MUTED)

@@ -47,7 +47,7 @@ def scene(facts: Facts, lod: int) -> Scene:
     """The meshes and joints of one level of detail, turned to face the viewer.
 
     Args:
-        facts: of the face.
+        facts: facts of the face.
         lod: from 0.
     """
     dna = facts.dna
@@ -94,9 +94,9 @@ def draw(canvas: Canvas, facts: Facts, lod: int, dpi: int) -> None:
 
     Args:
         canvas: the canvas.
-        facts: of the rig.
+        facts: facts of the rig.
         lod: the level of detail of meshes and joints.
-        dpi: of the images.
+        dpi: resolution of the images.
     """
     seen = scene(facts, lod)
     if not len(seen.joints) and not len(seen.shape.triangles):

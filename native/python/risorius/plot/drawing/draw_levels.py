@@ -20,8 +20,8 @@ def height(count: int, width: float) -> float:
     """Inches for this number of levels.
 
     Args:
-        count: of levels.
-        width: of the canvas, inches.
+        count: number of levels.
+        width: width of the canvas, inches.
     """
     return -(-max(count, 1) // COLUMNS) * (1.2 * width / COLUMNS + _HEAD)
 
@@ -31,9 +31,9 @@ def draw(canvas: Canvas, facts: Facts, words: Sequence[str], dpi: int) -> None:
 
     Args:
         canvas: the canvas.
-        facts: of the face.
+        facts: facts of the face.
         words: a line for each level.
-        dpi: of the images.
+        dpi: resolution of the images.
     """
     if not facts.lods:
         canvas.say("This file has no levels of detail.")

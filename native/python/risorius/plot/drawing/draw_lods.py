@@ -16,7 +16,7 @@ def draw(canvas: Canvas, facts: Facts) -> None:
 
     Args:
         canvas: the canvas.
-        facts: of the face.
+        facts: facts of the face.
     """
     if not facts.lods:
         canvas.say("This file has no levels of detail.")

@@ -24,8 +24,8 @@ def draw(canvas: Canvas, facts: Facts, dpi: int) -> None:
 
     Args:
         canvas: the canvas.
-        facts: of the rig.
-        dpi: of the images.
+        facts: facts of the rig.
+        dpi: resolution of the images.
     """
     if not facts.stored:
         canvas.say("This file has no joint matrix: no control moves a joint.")

@@ -14,7 +14,7 @@ def draw(canvas: Canvas, facts: Facts, with_counts: bool) -> None:
 
     Args:
         canvas: the canvas.
-        facts: of the face.
+        facts: facts of the face.
         with_counts: also draw the counts, if there is no table beside the picture.
     """
     high, counted = canvas.height - 0.7, 3.1 if with_counts else 0.0

@@ -100,7 +100,7 @@ def heading(axes: Axes, text: str, under: str = "") -> None:
     """The name of a panel, left-aligned above it.
 
     Args:
-        axes: of the panel.
+        axes: axes of the panel.
         text: the name.
         under: a line of numbers under the name.
     """

@@ -104,7 +104,7 @@ def render(
     Args:
         shape: x to the right, y up, z towards the viewer.
         frame: left, right, bottom, top of the picture in the surface's units.
-        height: of the picture in pixels; the width follows from the frame.
+        height: height of the picture in pixels; the width follows from the frame.
         smooth: samples per pixel in each direction, which are averaged for soft edges.
 
     Returns:
