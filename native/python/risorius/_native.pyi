@@ -1439,6 +1439,35 @@ class SparseCholesky:
     def solve(self, right: npt.ArrayLike, threads: _Int = 0) -> _F64:
         """float64[n, sides]."""
 
+class RegisterOptions:
+    """See risorius.anyhead.registration."""
+
+    def __init__(
+        self,
+        *,
+        mm: _Float,
+        trusted: list[int],
+        mirrored: list[int],
+        symmetry: _Float,
+        nodes: _Int,
+        noise: _Float,
+        threads: _Int,
+    ) -> None: ...
+
+def register_surface(
+    points: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    target_points: npt.ArrayLike,
+    target_triangles: npt.ArrayLike,
+    pair_vertices: npt.ArrayLike,
+    pair_points: npt.ArrayLike,
+    pair_weights: npt.ArrayLike,
+    start: npt.ArrayLike | None,
+    options: RegisterOptions,
+    progress: Callable[[float], bool | None] | None,
+) -> tuple[_F64, _I32, _F64, _F64, npt.NDArray[np.bool_]]:
+    """points, triangle, shares, distance, trusted: see risorius.anyhead.registration."""
+
 def simplify(
     positions: npt.ArrayLike,
     attributes: npt.ArrayLike,

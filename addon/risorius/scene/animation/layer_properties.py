@@ -36,7 +36,7 @@ _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 
 def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Let Blender evaluate the character; what is compiled is compared, and made anew."""
+    """Let Blender evaluate the character. Changed layers are then compiled again."""
     owner = self.id_data
     assert owner is not None
     owner.update_tag()
@@ -78,7 +78,7 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         description="Kind of the layer",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    # Of the expressions that come with Risorius; files from before there were two do not say it.
+    # Edition of the expressions of Risorius; files from the time of one edition do not store it.
     edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
         bpy.props.IntProperty, name="Seed", description="Seed of the random movement", min=0
@@ -173,7 +173,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them away; what files hold of them stays."""
+    """Remove the properties; values in files stay."""
     for name in (layer_rules.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")

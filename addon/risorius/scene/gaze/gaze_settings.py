@@ -23,7 +23,8 @@ def _changed(self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
 
 
 def _all() -> dict[str, object]:
-    """By their names. What a file does not say is as it was before there was such a property."""
+    """The settings by name. A missing setting has the value of files before that setting
+    existed."""
     shared: Any = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "override": _OVERRIDE}
     shared |= {"update": _changed, "translation_context": tables.CONTEXT}
     return {
@@ -67,13 +68,13 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them away; what files hold of them stays."""
+    """Remove the properties; values in files stay."""
     for name in _all():
         delattr(bpy.types.Object, name)
 
 
 def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
-    """Give a new face what serves it best.
+    """Set the defaults of a new face.
 
     Args:
         controls: its control armature.

@@ -81,7 +81,7 @@ class RISORIUS_Preferences(AddonPreferences):
 
 
 class RISORIUS_Idle(AddonPreferences):
-    """The preferences of a copy that does nothing because another one is in use."""
+    """The preferences of a copy that is idle because another copy is in use."""
 
     bl_idname = native.ADDON
 
@@ -90,7 +90,7 @@ class RISORIUS_Idle(AddonPreferences):
 
 
 def twice(other: str) -> str:
-    """What to do where another copy is in use.
+    """The sentence about another copy in use.
 
     Args:
         other: its module, bl_ext.REPOSITORY.risorius.

@@ -258,7 +258,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         unknown_curves.keep(controls, found)
 
     def _note_unknown(self, context: Context, error: Exception) -> None:
-        """Of a file of which no mapping knows any curve all of them."""
+        """Note all curves of a file that no mapping knows."""
         names = getattr(error, "unknown", ())
         if names:
             self._keep_unknown(face_controls(context), "", names)
@@ -354,7 +354,7 @@ def _gains(text: str) -> dict[str, float]:
 
 
 def lines_of(report: "native.Report") -> list[str]:
-    """What a report of risorius.importing has to say, a line each."""
+    """The sentences of a report of risorius.importing, one in each line."""
     lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
     told = [(head, names) for head, names in report.lists() if names != report.absent]
     lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]

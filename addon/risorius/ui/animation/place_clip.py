@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""How an operator puts a clip onto the active face, and what it reports."""
+"""Putting a clip onto the active face, and its report."""
 
 from collections.abc import Sequence
 
@@ -83,13 +83,13 @@ class PlacesClip(FaceOperator):
             notes: lines for the report.
             with_eyes: whether to turn the eye bones too.
             whole: whether keys lie on whole frames only.
-            tolerance: of few keys with handles, see clip_actions.make_action; 0 for all keys.
+            tolerance: see clip_actions.make_action; 0: all keys.
 
         Returns:
             Its action.
 
         Raises:
-            ClipError: the NLA is being edited, or nothing of the clip is for this face.
+            ClipError: the NLA is being edited, or no curve of the clip fits this face.
         """
         rig = face_rig(context)
         trouble = actions.busy(face_controls(context))
@@ -119,7 +119,7 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Bring controls that the animation does not move to rest, or say that they stay."""
+        """Set controls to rest that the animation does not move, or report that they stay."""
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:
@@ -154,6 +154,6 @@ class PlacesClip(FaceOperator):
 
 
 def report_of(action: bpy.types.Action | None) -> list[str]:
-    """What was said when an action was imported: lines."""
+    """The lines of the report of an imported action."""
     text = saved.text(action, _REPORT) if action is not None else ""
     return text.split("\n") if text else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an imported animation leaves as it was is brought to rest."""
+"""The operator that sets controls to rest that an imported animation does not move."""
 
 from collections.abc import Collection
 

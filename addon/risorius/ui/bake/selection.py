@@ -22,11 +22,11 @@ RANGES = (
 
 
 def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
-    """The characters of the selected objects, else the active one; linked ones are left out.
+    """The characters of the selected objects, or the active one, without linked ones.
 
     Args:
         context: scene and selection.
-        every: all characters of the scene instead.
+        every: True: all characters of the scene.
     """
     items = context.scene.objects if every else context.selected_objects
     rigs = [parts.rig_of(item) for item in items]
@@ -38,7 +38,7 @@ def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]
 
 
 class FacesOperator(FaceOperator):
-    """What operators on all selected faces share."""
+    """Base of operators on all selected faces."""
 
     every: bpy.props.BoolProperty(
         name="All Faces",

@@ -46,7 +46,8 @@ def _regions(_self: object, _context: object) -> list[tuple[str, str, str]]:
 
 
 class _Leading(FaceOperator):
-    """What operators share that may change what leads the face: no tweak is on meanwhile."""
+    """Base of operators that may switch between sliders and board; they need a face without an
+    active tweak."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -59,7 +60,7 @@ class _Leading(FaceOperator):
 
 
 class _OwnArmature(_Leading):
-    """What operators share that make or remove bones of the controls."""
+    """Base of operators that make or remove bones of the controls."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -75,7 +76,7 @@ class _OwnArmature(_Leading):
 
 
 class _OnBoard(HandOperator):
-    """What operators share that need a face board that leads."""
+    """Base of operators that need a leading face board."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -142,7 +143,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return len(board.handles_in(rig))
 
     def _lead(self, rig: ArmatureObject) -> None:
-        """Let a new board lead, unless keys of sliders would stand still by that."""
+        """Let a new board lead, unless sliders have keys."""
         if board_keys.animates_sliders(rig):
             self.report(
                 {"INFO"},
@@ -155,7 +156,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
 
 
 def _take_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a new board beside the head, its handles ready for the hand: in pose mode."""
+    """Show a new board beside the head, in pose mode."""
     controls = parts.controls_there(rig)
     if not controls.visible_get() or controls.hide_select:
         return
@@ -204,7 +205,8 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
 
 
 def _needs_board(cls: type[Operator], context: Context, missing: str) -> bool:
-    """Whether the face has a board; else the tooltip of the operator says what is missing."""
+    """Whether the face has a board; otherwise the tooltip of the operator says that it is
+    missing."""
     if _has_board(context):
         return True
     cls.poll_message_set(missing)

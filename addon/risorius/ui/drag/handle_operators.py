@@ -17,7 +17,7 @@ from . import pointing, view
 
 
 class _PointOperator(FaceOperator):
-    """What operators on one point share: its number, or what lies under the cursor."""
+    """Base of operators on one point, given by number or by the cursor."""
 
     mesh: bpy.props.IntProperty(
         name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
@@ -115,7 +115,7 @@ class RISORIUS_OT_select_handle(_PointOperator, Operator):
 
 
 class _SelectedOperator(FaceOperator):
-    """What operators on the selected handles share."""
+    """Base of operators on the selected handles."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -198,11 +198,11 @@ def run(context: Context, job: Generator[float, None, _T]) -> _T:
     """Run a generator to its end, with progress.
 
     Args:
-        context: whose window shows it.
-        job: yields the share that is done, 0 to 1.
+        context: with the window for the progress.
+        job: yields the finished share, 0 to 1.
 
     Returns:
-        What it returns.
+        The return value of the generator.
     """
     with shown_progress(context) as progress:
         try:
@@ -218,7 +218,7 @@ def _write_csv(clip: "native.Clip", path: Path) -> None:
 
 
 def _one_sentence(path: str, error: Exception) -> str:
-    """What went wrong; of an exporter's traceback only the last line."""
+    """The sentence of an error; of an exporter's traceback only the last line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]
     text = (useful or ["it failed without a word"])[-1].removeprefix("Error: ").rstrip(".")

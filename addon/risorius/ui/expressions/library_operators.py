@@ -28,7 +28,7 @@ _AT_ONCE = 3  # pictures after which the sidebar is drawn again
 
 
 def redraw(context: Context) -> None:
-    """Show new pictures: the sidebars of all windows are drawn again, and nothing else."""
+    """Show new pictures by redrawing the sidebars of all windows."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions if area.type == "VIEW_3D" else ():
@@ -110,7 +110,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
 
 
 class _LibraryOperator(FaceOperator):
-    """What operators on expressions of one's own share: one sentence for what goes wrong."""
+    """Base of operators on the user's expressions; they report an error as one sentence."""
 
     def execute(self, context: Context) -> Result:
         try:
@@ -124,7 +124,7 @@ class _LibraryOperator(FaceOperator):
         return {"FINISHED"}
 
     def work(self, context: Context) -> None:
-        """Do it. Raises: what a user can mend."""
+        """Do the work. Raises: errors that a user can repair."""
         raise NotImplementedError
 
 
@@ -135,8 +135,8 @@ def _put(
     shared: bool,
     over: Path | None = None,
 ) -> None:
-    """An expression of one's own as a pose asset of this file, and in the library, there in the
-    place of a file or in one of its own."""
+    """Store the user's expression as a pose asset of this file, and in the library in a new file or
+    instead of a file."""
     picture = assets.picture_of(rig, expression)
     sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
     if sitter is not None:
@@ -302,7 +302,7 @@ class RISORIUS_OT_star_expression(_OfOne, Operator):
 
 
 class _OfFolder(_LibraryOperator, OperatorBase):
-    """On a folder that the user chooses; asks before it writes over what is the user's."""
+    """Base of operators on a folder; they ask before they replace files of the user."""
 
     directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH")
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""How the grid of expressions is shown and what a click does; it goes with the window."""
+"""Settings of the grid of expressions and of a click, stored with the window."""
 
 from typing import cast
 
@@ -29,7 +29,7 @@ def region_items(_self: object, _context: object) -> list[tuple[str, str, str, i
 
 
 def remember_categories(groups: list[str]) -> None:
-    """Let the categories that there are be chosen.
+    """Offer the existing categories.
 
     Args:
         groups: of expressions, in their order.
@@ -49,7 +49,7 @@ def _categories(_self: object, _context: object) -> list[Item]:
 
 
 class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
-    """What the user chose."""
+    """The user's settings."""
 
     search: bpy.props.StringProperty(
         name="Search",
@@ -103,7 +103,7 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_expressions:
-    """What the user chose.
+    """The user's settings.
 
     Args:
         context: Blender context.

@@ -104,7 +104,7 @@ def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
 
 
 def weight_property() -> object:
-    """The slider: it shows and sets the override of the active face, and keeps nothing."""
+    """The slider property: it shows and sets the override of the active face and stores nothing."""
     return bpy.props.FloatProperty(
         name="Weight",
         translation_context=CONTEXT,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators on a face that is there: reset, keys, level of detail, shapes, overdrive."""
+"""Operators on an existing face: reset, keys, level of detail, shapes, overdrive."""
 
 from collections.abc import Collection
 

@@ -44,7 +44,7 @@ class RISORIUS_OT_frame_face(FaceOperator, Operator):
 
 
 def _only_outlines(context: Context) -> bool:
-    """Whether the control bones of a face are selected, or its armatures, and nothing else."""
+    """Whether only control bones or armatures of a face are selected."""
     rig = face_rig(context)
     controls = parts.controls_of(rig)
     if context.mode == "POSE":

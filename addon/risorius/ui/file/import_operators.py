@@ -39,14 +39,14 @@ def import_character(
     """Build a character and report on it.
 
     Args:
-        operator: reports through it.
+        operator: operator for the report.
         context: Blender context.
         path: of the DNA file.
         options: build.BuildOptions.
-        show: let the 3D views of the user's window show it.
+        show: frame it in the 3D views of the user's window.
 
     Returns:
-        What `execute` returns.
+        The result for `execute`.
     """
     try:
         with shown_progress(context) as progress:
@@ -267,7 +267,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         return done
 
     def finish(self, context: Context) -> Result:
-        """Import what was built."""
+        """Import the built face."""
         error = self._task.error
         if error is None:
             return self._import(context)
@@ -302,7 +302,7 @@ def draw_import(self: Menu, _context: Context) -> None:
 
 
 class RISORIUS_MT_sample(Menu):
-    """Who is added, and with what."""
+    """The people to add."""
 
     bl_idname = "RISORIUS_MT_sample"
     bl_label = "Face"
@@ -317,7 +317,7 @@ class RISORIUS_MT_sample(Menu):
 
 
 class RISORIUS_MT_sample_studio(Menu):
-    """Who is added with camera, lights and backdrop."""
+    """The people to add with camera, lights and backdrop."""
 
     bl_idname = "RISORIUS_MT_sample_studio"
     bl_label = "With Studio"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""A studio around a face that is there."""
+"""A studio around an existing face."""
 
 import bpy
 

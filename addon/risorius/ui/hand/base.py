@@ -21,9 +21,9 @@ MOMENTS = (
 
 
 class HandOperator(FaceOperator):
-    """What all operators share that move sliders or control bones.
+    """Base of all operators that move sliders or control bones.
 
-    They say in `move` what they do; when keys are inserted, and which, is said in one place.
+    They define `move`; keys are inserted by shared code.
     """
 
     at: bpy.props.EnumProperty(
@@ -31,15 +31,15 @@ class HandOperator(FaceOperator):
     )
 
     def move(self, context: Context) -> Collection[str] | None:
-        """Move the controls from what they show now.
+        """Move the controls from their current values.
 
         Returns:
-            The sliders that it had in its hands; None where it did nothing, and has said why.
+            The handled sliders; None if it did nothing and reported the reason.
         """
         raise NotImplementedError
 
     def stand_at(self, frame: float) -> None:
-        """Is told before each move which frame it is for."""
+        """Called with the frame before each move."""
 
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Eyes and head: what the eyes look at, how much the face takes of a body's turn, blinks."""
+"""Eyes and head: target of the eyes, share of a body's rotation, blinks."""
 
 import bpy
 
@@ -25,7 +25,7 @@ TARGETS = (
 
 
 def proposed(context: Context) -> str:
-    """The object that eyes are most likely to look at: the one in hand, else the camera; or "".
+    """The most likely target of the eyes: the active object, or the camera, or "".
 
     Args:
         context: has the selection and the scene.

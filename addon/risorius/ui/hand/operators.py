@@ -26,7 +26,7 @@ _NONE = 0.5  # of a breakdown: in the middle
 
 
 def control_under_mouse(context: Context) -> str:
-    """The slider whose button the mouse is over, or "". Args: context  of a key or a menu."""
+    """The slider under the mouse, or "". Args: context of a key or a menu."""
     found = getattr(context, "property", None)
     if found is None or found[0] != parts.controls_of(face_rig(context)):
         return ""
@@ -127,7 +127,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         now, paths, factor = keying.pose_of(controls), self._paths(context), self.factor
         if self.kind == "REST":
             return between.move(rig, now, between.rest_pose(rig, now), factor, paths)
-        # What has no curve has no pose before and after.
+        # Controls without a curve have no pose before and after.
         paths &= set(keying.curves_by_path(controls))
         skipped = keying.selected_frames(controls) if self.at == "SELECTED" else ()
         found = between.neighbours(controls, self._frame, now, paths, skipped)
@@ -189,9 +189,10 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
 
 
 def proposed_range(context: Context) -> tuple[int, int]:
-    """First and last frame of a tweak: of selected keys, of the preview, else around this frame.
+    """First and last frame of a tweak: of selected keys, of the preview range, or around this
+    frame.
 
-    Where all keys are selected nobody chose them: an import selects what it makes.
+    If all keys are selected, the selection is ignored, because an import selects its keys.
 
     Args:
         context: has the face and the scene.

@@ -15,7 +15,7 @@ from ..words import name_of_new, say
 
 
 class LayerOperator(FaceOperator):
-    """What all operators on the active layer share."""
+    """Base of all operators on the active layer."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -28,7 +28,7 @@ class LayerOperator(FaceOperator):
 
     @staticmethod
     def place(controls: ArmatureObject) -> int:
-        """The active layer's place; the highest one's where none is active."""
+        """The place of the active layer, or of the highest one."""
         place, count = controls.risorius_layers_index, len(layers.places(controls))
         if 0 <= place < count and not layers.places(controls)[place].removed:
             return place

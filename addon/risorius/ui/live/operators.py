@@ -24,7 +24,7 @@ _NOT_STARTED = "Start live capture first."
 
 
 class _Running(OperatorBase):
-    """What operators share that need a capture of the active face."""
+    """Base of operators that need a running capture of the active face."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -37,7 +37,7 @@ class _Running(OperatorBase):
 
 
 def _has_controls(cls: type[Operator], context: Context) -> bool:
-    """Poll: whether a face is active; says so when there is none."""
+    """Poll: whether a face is active; otherwise set the reason."""
     if active_controls(context) is None:
         cls.poll_message_set(say("Select a face first."))
         return False
@@ -113,7 +113,7 @@ class RISORIUS_OT_live_record(_Running, Operator):
 
 
 class _Waiting(OperatorBase):
-    """What operators share that need a recording that waits."""
+    """Base of operators that need a waiting recording."""
 
     index: bpy.props.IntProperty(
         name="Recording", description="Number of the waiting recording", options={"SKIP_SAVE"}
@@ -229,12 +229,12 @@ def _finish(
     """End a recording as an action.
 
     Args:
-        operator: reports how it went.
+        operator: operator for the report.
         context: has the face and the scene.
         finish: called with both.
 
     Returns:
-        Whether there is an action. Where there is none, what was recorded waits.
+        Whether an action was made; otherwise the recording waits.
     """
     rig = face_rig(context)
     try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""What the user chose for live capture."""
+"""The user's settings of live capture."""
 
 from typing import cast
 
@@ -30,7 +30,7 @@ def _changed(_self: "RISORIUS_PG_live", given: bpy.types.Context) -> None:
 
 
 class RISORIUS_PG_live(bpy.types.PropertyGroup):
-    """What the user chose; it goes with the window."""
+    """The user's settings, stored with the window."""
 
     source: bpy.props.EnumProperty(
         name="Source", description="App that sends", items=SOURCES, update=_source_changed
@@ -87,7 +87,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_live:
-    """What the user chose."""
+    """The user's settings."""
     return cast(RISORIUS_PG_live, context.window_manager.risorius_live)
 
 

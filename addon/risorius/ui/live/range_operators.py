@@ -19,7 +19,7 @@ from ..words import of_error, say
 
 
 class _Learns(FaceOperator):
-    """What operators share that learn a range."""
+    """Base of operators that learn a range."""
 
     baked_too = True
 
@@ -35,15 +35,15 @@ class _Learns(FaceOperator):
     )
 
     def keep(self, context: Context, clip: "native.Clip", performance: bool) -> None:
-        """Learn from a clip as captured, and keep what was learned with the active face.
+        """Learn a range from a captured clip and store it with the active face.
 
         Args:
             context: has the face.
             clip: risorius.Clip of raw controls.
-            performance: whether it shows acting, not all extremes.
+            performance: True: the clip shows acting and not all extremes.
 
         Raises:
-            risorius.RisoriusError: nothing can be learned of it.
+            risorius.RisoriusError: the clip gives no range.
         """
         found = native.part("ranges").learn(clip, performance=performance, most_gain=self.most_gain)
         range_properties.keep(face_controls(context), found)
@@ -142,7 +142,7 @@ class RISORIUS_OT_load_range(FaceOperator, Operator, ImportHelper):
 
 
 class _HasRange(FaceOperator):
-    """What operators share that need a range."""
+    """Base of operators that need a range."""
 
     baked_too = True
 

@@ -42,7 +42,7 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
 
 
 def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
-    """Adds faces to those that are mixed; those that do not go together are said and left out."""
+    """Add faces to the mix; faces that do not match are reported and left out."""
     chosen = choices(context)
     added = 0
     for path in paths:

@@ -44,13 +44,13 @@ class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_mix(bpy.types.PropertyGroup):
-    """What the user chose; it goes with the window."""
+    """The user's settings, stored with the window."""
 
     parents: bpy.props.CollectionProperty(type=RISORIUS_PG_mix_parent)
 
 
 def choices(context: Context) -> RISORIUS_PG_mix:
-    """What the user chose.
+    """The user's settings.
 
     Args:
         context: Blender context.
@@ -86,7 +86,7 @@ def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]
 
 
 def follow(context: Context) -> None:
-    """Moves the preview, if there is one, to what the sliders say.
+    """Update the preview, if there is one, to the sliders.
 
     Args:
         context: Blender context.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Curves of an imported file that no mapping knows: what they are, kept as a mapping."""
+"""Unknown curves of an imported file: assigning them, and saving the mapping."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ _MOST = 40  # lines that are drawn
 
 
 class _OfCurves(FaceOperator):
-    """What operators on unknown curves share."""
+    """Base of operators on unknown curves."""
 
     baked_too = True
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the face has unknown curves; says why not."""
+        """Whether the face has unknown curves; otherwise set the reason."""
         if not super().poll(context):
             return False
         if unknown_curves.of(face_controls(context)) is None:

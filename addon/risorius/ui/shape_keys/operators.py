@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators that say what a shape key is, keep that in a file, and draw the pictures of keys."""
+"""Operators that assign shape keys, save and load the assignments, and draw pictures of keys."""
 
 from __future__ import annotations
 
@@ -39,18 +39,19 @@ WAYS = (
 _AT_ONCE = 6  # pictures after which the sidebar is drawn again
 
 EnumItem = tuple[str, str, str, int, int]
-# What can be chosen, as Blender has it; it keeps no copy of the words.
+# Items of the enum; Blender keeps no copy of their strings.
 _items: list[EnumItem] = session.keep("shape_keys.items", list, ("unregister",))
 
 
 class OfHead(OperatorBase):
-    """What all operators on the keys of a head share."""
+    """Base of all operators on the keys of a head."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the active object is a head whose keys one may speak of; says why if not."""
+        """Whether the active object is a head whose keys can be assigned; otherwise set the
+        reason."""
         if not usable(cls):
             return False
         if not shape_key_head.usable_head(context.active_object):
@@ -65,7 +66,7 @@ def head_of(context: Context) -> MeshObject:
 
 
 class Says(OfHead):
-    """What operators share that say what a key is."""
+    """Base of operators that assign a key."""
 
     key: bpy.props.StringProperty(
         name="Shape Key", description="Empty: the active one", options={"SKIP_SAVE"}
@@ -81,7 +82,7 @@ class Says(OfHead):
         return True
 
     def keep(self, context: Context, value: assigned.Said | None) -> Result:
-        """Keep what is said of the key. Args: context, value  None: its name decides."""
+        """Store the assignment of the key. Args: context, value None: its name decides."""
         item = head_of(context)
         name = self.key or shown.active_key(item)
         if name not in assigned.of(item).rows:
@@ -133,7 +134,7 @@ choice_items = _listed
 
 
 def fill_choices() -> None:
-    """What can be chosen, with the pictures that are there by now."""
+    """Fill the enum with the existing pictures."""
     _items[:] = [
         (
             choice.value,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators that correct what a voice says: sounds, words, markers."""
+"""Operators that correct the sounds, words and markers of a voice."""
 
 import sys
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _MOVED = "The markers were changed: choose Update Speech first."
 
 
 def voice_of(context: Context) -> bpy.types.Action | None:
-    """The action whose voice the panel shows, or None where the face speaks none."""
+    """The action whose voice the panel shows, or None."""
     return next(iter(voices.all_of(face_controls(context))), None)
 
 
@@ -38,7 +38,7 @@ def are_moved(context: Context, action: bpy.types.Action) -> bool:
 
 
 class _Corrects(FaceOperator):
-    """What all corrections share: the voice, its keys and markers follow, errors are sentences."""
+    """Base of all corrections: keys and markers follow, errors are sentences."""
 
     reads_markers = False  # it may be used while changed markers wait
 
@@ -102,7 +102,7 @@ class _CorrectsSound(_Corrects):
     def _corrected(
         self, sounds: Sequence[Sound], place: int, end: float
     ) -> tuple[list[Sound], int]:
-        """The new list, and the place in it that is chosen from now on. Raises: SpokenError."""
+        """The new list, and the selected place in it. Raises: SpokenError."""
         raise NotImplementedError
 
 

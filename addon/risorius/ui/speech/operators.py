@@ -135,7 +135,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return words.say("Speech was cancelled.")
 
     def finish(self, context: Context) -> Result:
-        """Put what was made onto the face. It may have gone while the thread worked."""
+        """Put the result onto the face, which may have been deleted meanwhile."""
         task = self._task
         try:
             if task.result is None:
@@ -166,7 +166,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return clip_actions.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """A voice has the face while it sounds, and gives it back; a hand's layer would hold on."""
+        """Settings of a voice's layer: it moves the face only while it sounds."""
         fade = round(_FADE * clip_actions.frame_rate(context.scene))
         return {"extend": "NOTHING", "fade_in": float(fade), "fade_out": float(fade)}
 

@@ -23,7 +23,7 @@ SHAPES = (
 
 
 def override_trouble(rig: ArmatureObject | None) -> str:
-    """Why a face that is an override stands still; empty for all others, and for None."""
+    """The reason why an override face does not move; empty for all others and for None."""
     if rig is None or not rig.override_library:
         return ""
     return library_overrides.trouble(rig)
