@@ -20,8 +20,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     info = subparsers.add_parser(
         "info",
         help="show the content of a DNA file, or the differences between two",
-        description="Shows the content of a file. With --diff, shows the differences between two "
-        "files (.dna or .json) in words; exit codes as in diff: 0 same, 1 different, 2 error.",
+        description="Shows the content of a file. With --diff, shows the differences of two files "
+        "(.dna or .json) in words; exit codes as in diff: 0 the same, 1 different, 2 trouble.",
     )
     info.add_argument("file", type=Path, nargs="?")
     info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="differences between two files")

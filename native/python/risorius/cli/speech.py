@@ -89,7 +89,8 @@ def complain(args: argparse.Namespace) -> None:
     require_writable(args.out, args.phonemes)
     if args.text is not None and Path(args.text).is_file():
         raise CommandLineError(
-            f"--text: the spoken text was expected, found a file: {args.text} (use --transcript)"
+            f"--text: the spoken text was expected, found the file "
+            f"{args.text}: --transcript reads it"
         )
     if args.phonemes is not None and args.phonemes.resolve() == args.out.resolve():
         raise CommandLineError("--phonemes: another file than that of -o was expected")
