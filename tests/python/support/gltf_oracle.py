@@ -104,6 +104,7 @@ class GlbFile:
         def walk(number, above):
             node = self.json["nodes"][number]
             own = np.eye(4)
+            own[:3, :3] = _turn(*node.get("rotation", [0, 0, 0, 1]))
             own[:3, 3] = node.get("translation", [0, 0, 0])
             out[number] = above @ own
             for child in node.get("children", []):
@@ -112,3 +113,10 @@ class GlbFile:
         for number in self.json["scenes"][0]["nodes"]:
             walk(number, np.eye(4))
         return out
+
+
+def _turn(x, y, z, w):
+    """float64[3, 3] of a unit quaternion."""
+    assert abs(x * x + y * y + z * z + w * w - 1) < 1e-6
+    a, b = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) * (w * w - a @ a) + 2 * np.outer(a, a) + 2 * w * b

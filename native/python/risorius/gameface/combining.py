@@ -94,9 +94,13 @@ class Sums:
         out = list[Combination]()
         for kind, of in wanted:
             name = "_x_".join(of) if kind == PRODUCT else f"{of[0]}_{kind}"
-            away = np.sqrt(np.square(self._missing(kind, of)).sum(axis=1).max(initial=0.0))
-            out.append(Combination(name, of, kind, 1000.0 * float(away)))
+            out.append(Combination(name, of, kind, self.apart(of, kind)))
         return sorted(out, key=lambda one: -one.error_mm)
+
+    def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
+        """Millimetres of a sum from the rig at most. Args: of: its targets; kind: of weight."""
+        missing = self._missing(kind, of)
+        return 1000.0 * float(np.sqrt(np.square(missing).sum(axis=1).max(initial=0.0)))
 
     def _missing(self, kind: str, of: tuple[str, ...]) -> Doubles:
         """What the linear sum lacks where targets are on as their weight counts most."""

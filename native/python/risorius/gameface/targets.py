@@ -14,16 +14,12 @@ from .. import expressions
 from .._native import Rig
 from ..base.words import counted, joined
 from ..controls import arkit, vocabulary
+from .avatar.vrm import PRESETS
 from .errors import GameFaceError
 
 Floats = npt.NDArray[np.float32]
 
 GROUPS = ("arkit", "visemes", "vrm", "expressions", "all")
-VRM = (
-    "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh",
-    "blink", "blinkLeft", "blinkRight", "lookUp", "lookDown", "lookLeft", "lookRight",
-)  # fmt: skip
-"""The presets of VRM 1.0."""
 _UNSAFE = re.compile(r"[^\w+\- ]")  # three.js and Unreal take dots, brackets and slashes for paths
 _LISTED = 6
 
@@ -155,7 +151,7 @@ def _rows(group: str) -> Iterator[tuple[str, Mapping[str, float]]]:
     library = expressions.load()
     if group == "vrm":
         presets = vocabulary.vocabulary("vrm").meanings
-        for name in VRM:
+        for name in PRESETS:
             said = presets["Neutral" if name == "neutral" else _spelled(name)]
             own = library.get(said.expression)
             yield name, own.weights if own else said.controls

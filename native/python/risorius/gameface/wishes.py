@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 TEXTURES = 1024
 
@@ -24,6 +25,9 @@ class Wishes:
         most: targets that the client takes, None: any number.
         within: millimetres that sums of two may deviate; the driver adds what is missing. None: no
             driver.
+        humanoid: of avatar.humanoid.KINDS: missing bones are made up; "": none.
+        vrm: 1.0 or 0.x, "": a glTF that is no VRM.
+        licence: fields of a VRM, as avatar.licence asks for them.
     """
 
     shapes: Sequence[str] = ("arkit", "visemes")
@@ -37,3 +41,6 @@ class Wishes:
     mb: float | None = None
     most: int | None = None
     within: float | None = None
+    humanoid: str = ""
+    vrm: str = ""
+    licence: Mapping[str, Any] = field(default_factory=dict)
