@@ -153,7 +153,10 @@ def test_a_made_up_body_leaves_the_face_where_it_is(face, tmp_path):
     assert nodes[0]["name"] == "Armature"
     names = {node["name"] for node in nodes}
     assert {"Hips", "Spine2", "LeftForeArm", "RightHandPinky3", "LeftToeBase", "LeftEye"} <= names
-    assert set(plain.meshes()) <= {nodes[i]["name"] for i in nodes[0]["children"]}
+    below = {nodes[i]["name"] for i in nodes[0]["children"]}
+    assert below == {*plain.meshes(), "Hips"} | ({"Soles"} & below)
+    lowest = min(plain.positions(mesh)[:, 1].min() for mesh in plain.meshes())
+    assert ("Soles" in below) == (lowest > 0.3)  # else something stands on the ground
 
 
 def test_a_body_of_the_faces_own_needs_none_made_up(face, tmp_path, capsys):

@@ -36,8 +36,9 @@ def driven(weights, table):
 class Posed:
     """The meshes of a .glb at weights, and the rig's meshes in the same order at raw controls."""
 
-    def __init__(self, dna, rig, found, lod):
+    def __init__(self, dna, rig, found, lod, *, facing_back=False):
         self.rig, self.found = rig, found
+        self._sides = np.array([-1.0, 1.0, -1.0]) if facing_back else np.ones(3)
         self._surface = risorius.Surface(dna, rig, lod)
         self._number = {name: i for i, name in enumerate(dna.mesh_names)}
         self._rest, self._deltas, self._where = {}, {}, {}
@@ -75,7 +76,8 @@ class Posed:
 
     def _own(self, mesh, raw):
         # The sample's axes are those of glTF; its unit is the centimetre.
-        return self._surface.positions(raw, self._number[mesh]).astype(np.float64) / 100
+        found = self._surface.positions(raw, self._number[mesh]).astype(np.float64)
+        return found * self._sides / 100
 
 
 def frames(path, take, *, lod, every):

@@ -73,8 +73,11 @@ class GlbFile:
     def names(self, name):
         return self.meshes()[name][1].get("extras", {}).get("targetNames", [])
 
-    def positions(self, name, weights=None, kind="POSITION"):
-        """float64[V, 3] of a mesh in the scene, its targets on by weights, its joints at rest."""
+    def positions(self, name, weights=None, kind="POSITION", world=None):
+        """float64[V, 3] of a mesh in the scene, its targets on by weights.
+
+        Args:
+            world: node -> float64[4, 4], where its joints are; None: at rest."""
         node, mesh = self.meshes()[name]
         [primitive] = mesh["primitives"]
         out = self.numbers(primitive["attributes"][kind])
@@ -83,14 +86,14 @@ class GlbFile:
         for target, called in zip(primitive.get("targets", []), names, strict=True):
             if weights and weights.get(called) and kind in target:
                 out = out + weights[called] * self.numbers(target[kind])
-        return self._placed(node, primitive, out) if kind == "POSITION" else out
+        return self._placed(node, primitive, out, world) if kind == "POSITION" else out
 
-    def _placed(self, node, primitive, points):
+    def _placed(self, node, primitive, points, world):
         if "skin" not in node:
             return points * node.get("scale", 1.0) + node.get("translation", [0, 0, 0])
         skin = self.json["skins"][node["skin"]]
         inverse = self.numbers(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
-        world = self._world()
+        world = self._world() if world is None else world
         moves = np.stack([world[j] @ inverse[i] for i, j in enumerate(skin["joints"])])
         joints = self.numbers(primitive["attributes"]["JOINTS_0"]).astype(int)
         weights = self.numbers(primitive["attributes"]["WEIGHTS_0"])

@@ -22,6 +22,7 @@ Floats = npt.NDArray[np.float32]
 
 _STEPS = 32767  # whole numbers to each side of the middle of a quantized face
 _TURNED = 127.0
+_REACHES = 0.2  # metres: meshes that end so near to the feet stand on them
 _LEAST_TURN = 1e-3  # a change of a normal below a sixteenth of a degree is none
 
 
@@ -108,6 +109,8 @@ class _Writer:
             named = mesh.get("extras", {}).get("targetNames", [])
             shown.append(vrm.Shown(len(nodes), node["mesh"], named, self._first_person(part)))
             nodes.append(node)
+        if self.wishes.humanoid == "mixamo":
+            self._add_soles(below)
         table.update(scene=0, scenes=[{"name": "Face", "nodes": roots}])
         if self.wishes.vrm:
             self._make_vrm(shown, changes, manner)
@@ -134,6 +137,29 @@ class _Writer:
         name, made = vrm.extension(self.wishes.vrm, avatar, table.get("materials", []))
         table.setdefault("extensions", {})[name] = made
         self.glb.uses(name, required=False)
+
+    def _add_soles(self, below: list[int]) -> None:
+        """Two triangles of a millimetre where a body without meshes stands: TalkingHead lowers an
+        avatar until its lowest vertex is on the ground, and a head alone would sink into it."""
+        own, table = self.skeleton, self.glb.table
+        feet = [own.bones[f"{side}Toes"] for side in ("left", "right")]
+        if self.points.rest[:, 1].min() < own.places[feet, 1].max() + _REACHES:
+            return
+        corners = np.array([[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]])
+        places = (own.places[feet][:, None] + corners).reshape(-1, 3) - self.middle
+        joints = np.zeros((6, INFLUENCES), "u1")
+        joints[:, 0] = np.repeat(feet, 3)
+        primitive = {
+            "attributes": {
+                "POSITION": self.glb.vertices((places / self.step).astype("<f4"), bounds=True),
+                "JOINTS_0": self.glb.vertices(joints),
+                "WEIGHTS_0": self._weights(np.eye(1, INFLUENCES).repeat(6, axis=0)),
+            },
+            "indices": self.glb.corners(np.arange(6).reshape(2, 3), 6),
+        }
+        table["meshes"].append({"name": "Soles", "primitives": [primitive]})
+        below.append(len(table["nodes"]))
+        table["nodes"].append({"name": "Soles", "mesh": len(table["meshes"]) - 1, "skin": 0})
 
     def _first_person(self, part: Part) -> str:
         """Whether the owner of the head sees a mesh: of one that ends at the neck, a part."""
