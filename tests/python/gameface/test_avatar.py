@@ -205,7 +205,7 @@ def sentence(capsys, *arguments):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (None, "VRM 1.0 asks for name (a text), authors (a list of texts), avatarPermission"),
+        (None, "VRM 1.0 asks for name, authors, avatarPermission"),
         ({"name": ""}, "name: a text was expected, found ''"),
         ({"authors": []}, "authors: a list of texts was expected, found []"),
         ({"authors": [" "]}, "authors: a list of texts was expected, found [' ']"),

@@ -85,9 +85,9 @@ def checked(table: Mapping[str, Any], version: str, where: str) -> dict[str, Any
             raise GameFaceError(
                 f"{where}: {field}: {_said(known[field])} was expected, found {value!r}"
             )
-    if missing := [f"{field} ({_said(asked[field])})" for field in asked if field not in table]:
+    if missing := [field for field in asked if field not in table]:
         raise GameFaceError(
-            f"{where}: VRM {version} asks for {joined(missing)}: nothing of a licence is assumed"
+            f"{where}: VRM {version} asks for {joined(missing)}: say them, a licence is never assumed"
         )
     return dict(table)
 
