@@ -12,6 +12,7 @@ import asyncio
 import json
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,11 @@ KINDS = {
     "sparse": Wishes(lod=LOD, within=0.5, sparse=True, skeleton=False),
     "packed": Wishes(lod=LOD, within=0.5, quantize=True, meshopt=True),
 }
-ALLOWED_MM = {"plain": CLIENT_MM, "sparse": CLIENT_MM, "packed": QUANTIZED_MM}
+FITTED = "fitted"  # as packed, and its combinations know the first half of the take
+ALLOWED_MM = {
+    "plain": CLIENT_MM, "sparse": CLIENT_MM, "packed": QUANTIZED_MM, FITTED: QUANTIZED_MM
+}  # fmt: skip
+DRIVEN_MM = 0.5
 FRAMES = 12
 
 
@@ -90,6 +95,8 @@ async def try_take(one: Browser, posed: Any, take: Path, table: Any, kind: str) 
             f"  frame {frame:5d}: three.js from the sum {sums:.4f}, driven {full_sums:.4f}; "
             f"from the rig {away:.2f}, driven {full_away:.2f} mm"
         )
+    if max(row[4] for row in rows) > DRIVEN_MM:
+        raise RuntimeError(f"{kind}: frames within {DRIVEN_MM} mm of the rig were expected")
     if max(max(row[1:3]) for row in rows) > ALLOWED_MM[kind]:
         raise RuntimeError(
             f"{kind}: the client's sums: at most {ALLOWED_MM[kind]} mm were expected"
@@ -97,6 +104,9 @@ async def try_take(one: Browser, posed: Any, take: Path, table: Any, kind: str) 
 
 
 async def main(folder: Path, face: Path, take: Path | None) -> None:
+    if take is not None:
+        units = units_of(take)
+        KINDS[FITTED] = replace(KINDS["packed"], frames=units[: len(units) // 2 : 8])
     async with page(folder, "page.html") as one:
         for kind in KINDS:
             await try_kind(one, folder, face, kind, take)

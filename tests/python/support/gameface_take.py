@@ -24,10 +24,13 @@ def driven(weights, table):
     """Weights with those of the combinations, as combinations.js sets them."""
     out = dict(weights)
     for row in table["combinations"]:
-        a, b = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0)[:2]
+        a, b, c = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0, 0.0)[:3]
         kinds = {
             "product": a * b, "half": 4 * a * (1 - a), "below": 4 * a * (1 - b),
-            "share": 4 * a * max(0, b - a),
+            "share": 4 * a * max(0, b - a), "cubic": 32 / 3 * a * (1 - a) * (1 - 2 * a),
+            "early": 4 * a * (1 - a) * b, "late": 4 * a * b * (1 - b),
+            "middle": 16 * a * b * (1 - a) * (1 - b), "triple": a * b * c,
+            "shut": min(1.0, a / max(b, 0.02)) * (1 - b) * c,
         }  # fmt: skip
         out[row["target"]] = float(kinds[row["weight"]])
     return out

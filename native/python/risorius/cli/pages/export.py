@@ -11,6 +11,7 @@ import risorius
 from ...files import fileio
 from ...gameface import GROUPS, Wishes, export
 from ...gameface.avatar import humanoid, licence
+from ...gameface.takes import frames_of
 from ..files import (
     CommandLineError,
     number,
@@ -64,6 +65,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "that drive them",
     )
     parser.add_argument(
+        "--takes",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="TAKE",
+        help="captures with ARKit's units: combinations are fitted to their frames too",
+    )
+    parser.add_argument(
         "--humanoid", choices=humanoid.KINDS, help="make up the bones of a body: those that VRM "
         "needs, or all by Mixamo's names, as TalkingHead wants them",
     )  # fmt: skip
@@ -82,6 +91,8 @@ def run(args: argparse.Namespace) -> int:
     require_writable(out)
     if args.licence and not args.vrm:
         raise CommandLineError("--licence is of a VRM: add --vrm 1.0 or --vrm 0.x")
+    if args.takes and args.within is None:
+        raise CommandLineError("--takes is for combinations: add --within, such as --within 0.5")
     if args.no_skeleton and (args.vrm or args.humanoid):
         raise CommandLineError("--no-skeleton: a VRM, and a humanoid, have a skeleton")
     said = licence.read(args.licence, args.vrm) if args.licence else {}
@@ -90,12 +101,13 @@ def run(args: argparse.Namespace) -> int:
     for group in shapes:
         if group not in GROUPS:
             raise CommandLineError(f"--shapes: {', '.join(GROUPS)} were expected, found {group!r}")
+    frames = [frame for take in args.takes for frame in frames_of(take)]
     dna = risorius.load(args.file)
     rig = risorius.compile_cached(args.file)
     wishes = Wishes(
         shapes, args.lod, not args.no_skeleton, args.sparse, args.quantize, args.meshopt,
-        args.normals, args.textures, args.mb, args.most, args.within, args.humanoid or "",
-        args.vrm or "", said,
+        args.normals, args.textures, args.mb, args.most, args.within, frames,
+        args.humanoid or "", args.vrm or "", said,
     )  # fmt: skip
     made = export(dna, rig, args.file, out.name, wishes)
     fileio.write_all({out.with_name(name): data for name, data in made.files.items()})
