@@ -3,6 +3,8 @@
 
 packaging/ship/gameface.sh tries three-vrm, TalkingHead and the VRM reader of Blender."""
 
+import re
+
 import dna_bytes
 import numpy as np
 import pytest
@@ -238,3 +240,32 @@ def test_wishes_that_do_not_go_together(face, tmp_path, capsys):
         capsys, GOLDEN / "tiny_v28.dna", "--shapes", "all", "--humanoid", "mixamo"
     )
     assert (code, "a joint called head was expected" in line) == (1, True)
+
+
+# What engines take for a path, or refuse, in names of nodes and targets; whether small letters are
+# the same as large ones. None of them is run here.
+ENGINES = {
+    "Godot": (r'[.:@/"%]', False),
+    "Unity": (r"[/\x00-\x1f]", False),
+    "Unreal": (r"""[\s"',./:|&!~@#(){}\[\]=;^%$`]""", True),
+}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_names_are_such_as_engines_take(face, tmp_path, engine):
+    dna = risorius.load(face)
+    dna.mesh_names = [f"a b/{name}" for name in dna.mesh_names]
+    dna.raw_control_names = [*dna.raw_control_names[:-2], "CTRL_expressions.a b$", "own.JawOpen"]
+    path, out = tmp_path / "named.dna", tmp_path / "named.glb"
+    dna.save(path)
+    groups = "arkit,visemes,vrm,expressions,all"
+    wished = ["--shapes", groups, "--humanoid", "mixamo", "--lod", "3"]
+    assert main(["export", str(path), "-o", str(out), *wished]) == 0
+    found = GlbFile(out.read_bytes()).json
+    refused, is_loose = ENGINES[engine]
+    lists = [[node["name"] for node in found["nodes"]]]
+    lists += [mesh["extras"]["targetNames"] for mesh in found["meshes"] if "extras" in mesh]
+    for names in lists:
+        assert not [name for name in names if re.search(refused, name) or len(name) > 1023]
+        assert len({name.lower() if is_loose else name for name in names}) == len(names)
+    assert len(lists[1]) > 150

@@ -14,6 +14,7 @@ from ..author.geometry.skeleton import skin_entries
 from ..solving.surface import Surface
 from ..web.kinds import kind_of
 from .errors import GameFaceError
+from .naming import safe
 from .skeleton import Skeleton
 
 Doubles = npt.NDArray[np.float64]
@@ -133,7 +134,7 @@ class Points:
         if not len(mesh.normals):
             normals = normals_of(self.rest[rows], triangles, rows)
         return Part(
-            name.replace("/", "_"), name, kind_of(name), rows,
+            safe(name), name, kind_of(name), rows,
             np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1), normals,
             triangles, joints[row], weights[row],
         )  # fmt: skip

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,11 +15,11 @@ from ..base.words import counted, joined
 from ..controls import arkit, vocabulary
 from .avatar.vrm import PRESETS
 from .errors import GameFaceError
+from .naming import safe, unlike
 
 Floats = npt.NDArray[np.float32]
 
 GROUPS = ("arkit", "visemes", "vrm", "expressions", "all")
-_UNSAFE = re.compile(r"[^\w+\- ]")  # three.js and Unreal take dots, brackets and slashes for paths
 _LISTED = 6
 
 
@@ -66,17 +65,13 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
 
 def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
-    """A name that every client reads and no other target has."""
-    safe = _UNSAFE.sub("_", name) or "_"
-    if safe != name:
-        notes.append(f"{name}: no client reads such a name: the target is {safe}")
-    if safe in taken:
-        safe = f"{group}_{safe}"
-    number, free = 2, safe
-    while free in taken:
-        number, free = number + 1, f"{safe}_{number}"
-    taken.add(free)
-    return free
+    """A name that every client reads and no other target has: Unreal takes eyes for Eyes."""
+    free = safe(name)
+    if free != name:
+        notes.append(f"{name}: no client reads such a name: the target is {free}")
+    if free.lower() in taken:
+        free = f"{group}_{free}"
+    return unlike(free, taken)
 
 
 class _Finder:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from .avatar import vrm
 from .glb import QUANTIZED, Glb
 from .materials import Materials
+from .naming import unlike
 from .parts import INFLUENCES, Part, Points, normals_of
 from .skeleton import Skeleton
 from .wishes import Wishes
@@ -95,10 +96,10 @@ class _Writer:
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
-        names: set[str] = set()
+        names = {node["name"].lower() for node in nodes}
         for part in self.points.parts:
             mesh = self._mesh(part, changes, part is whole)
-            name = _unlike(part.name, names)
+            name = unlike(part.name, names)
             table.setdefault("meshes", []).append({"name": name, **mesh})
             node: dict[str, Any] = {"name": name, "mesh": len(table["meshes"]) - 1}
             if self.wishes.skeleton:
@@ -270,15 +271,6 @@ class _Writer:
         if not self.wishes.quantize:
             return self.glb.vertices(np.ascontiguousarray(values, "<f4"))
         return self.glb.vertices(np.rint(values * 255).astype("u1"), normalized=True)
-
-
-def _unlike(name: str, names: set[str]) -> str:
-    """A name that no other mesh has."""
-    free, number = name, 2
-    while free in names:
-        free, number = f"{name}_{number}", number + 1
-    names.add(free)
-    return free
 
 
 def _quaternion(turn: Doubles) -> list[float]:
