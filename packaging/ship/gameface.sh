@@ -29,6 +29,7 @@ step "tools"
 works "game face, tools" tools get_tools || exit 1
 [ -e "$face" ] || face="$out/sample.dna"
 step "chromium"
+rm -f "$out/targets.tsv"
 set --
 [ -e "$take" ] && set -- "$take"
 [ -e "$take" ] && [ -e "$voice" ] && set -- "$take" "$voice"

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import risorius
-from clients import CLIENT_MM, LOD, QUANTIZED_MM, Browser, GlbFile, apart, page, places
+from clients import CLIENT_MM, LOD, QUANTIZED_MM, Browser, GlbFile, apart, listed, page, places
 from gameface_take import Posed, driven, units_of
 from risorius.gameface import Wishes, export
 
@@ -58,7 +58,9 @@ async def try_kind(one: Browser, folder: Path, face: Path, kind: str, take: Path
         weights = {target.name: 1.0, **({target.needs: 1.0} if target.needs else {})}
         at = await client(one, weights, table=False)
         worst_file = max(worst_file, apart(at, posed.sum(weights)))
-        worst_rig = max(worst_rig, apart(at, posed.rig_at(target.raw)))
+        away = apart(at, posed.rig_at(target.raw))
+        listed(folder, f"three.js {kind}", target.name, away)
+        worst_rig = max(worst_rig, away)
     print(
         f"  single poses: three.js from the file {worst_file:.4f} mm, "
         f"from the rig {worst_rig:.4f} mm"

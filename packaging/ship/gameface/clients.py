@@ -89,6 +89,12 @@ def from_the_file(
     return apart(places(state["places"]), own)
 
 
+def listed(folder: Path, client: str, target: str, away: float) -> None:
+    """A row of targets.tsv: client, target, millimetres from the rig at that pose alone."""
+    with (folder / "targets.tsv").open("a") as table:
+        table.write(f"{client}\t{target}\t{away:.4f}\n")
+
+
 def say(value: object) -> str:
     """As a page takes it."""
     return json.dumps(value)
