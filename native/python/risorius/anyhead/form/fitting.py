@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: MIT
+"""The model of form laid onto a surface: its place, its size, its parts (iterative closest points).
+
+Each round pairs the model's vertices with the closest points of the surface whose normals agree,
+and solves place, size and parts together (Gauss-Newton; parts as likely as the model says).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from ... import _native
+from ...author.geometry.skeleton import Doubles, Ints
+from ..surface import Surface
+from .heads import HeadForm, head_form
+
+_NOISE = 0.1  # cm of the model, of what parts explain
+_ALIKE = 0.08  # neighbours err alike: what share of the pairs counts as a measurement of its own
+_ALONG = 0.15  # how much a pair says of places along the surface, where that across it says 1
+_OPEN = (0.0, 1.2)  # what an expression may be
+_BEYOND = 3.5  # standard deviations that a part may have
+
+
+@dataclass
+class Pose:
+    """Where a form is: point = scale * rotation @ form + shift.
+
+    Attributes:
+        rotation: float64[3, 3].
+        scale: units of the surface in a cm of the form.
+        shift: float64[3].
+        parts: float64[K].
+        expressions: float64[E].
+    """
+
+    rotation: Doubles
+    scale: float
+    shift: Doubles
+    parts: Doubles = field(default_factory=lambda: np.zeros(len(head_form().parts)))
+    expressions: Doubles = field(default_factory=lambda: np.zeros(len(head_form().expressions)))
+
+    def points(self, form: HeadForm) -> Doubles:
+        """float64[V, 3] in the surface's space."""
+        return self.place(form.shaped(self.parts, self.expressions))
+
+    def place(self, points: Doubles) -> Doubles:
+        """float64[n, 3] of the form's space -> of the surface's."""
+        return np.asarray(self.scale * points @ self.rotation.T + self.shift)
+
+    def back(self, points: Doubles) -> Doubles:
+        """float64[n, 3] of the surface's space -> of the form's."""
+        return np.asarray((points - self.shift) @ self.rotation / self.scale)
+
+
+class Target:
+    """A surface that forms are laid onto.
+
+    Attributes:
+        surface: it.
+        closest: finds its points.
+        normals: float64[T, 3] of length 1, of its triangles.
+        open_side: bool[T, 3], whether the side across from each corner is at a border.
+    """
+
+    def __init__(self, surface: Surface) -> None:
+        self.surface = surface
+        self.closest = _native.ClosestPoints(surface.points, surface.triangles)
+        normals = surface.face_normals()
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        self.normals = normals / np.maximum(length, 1e-300)
+        self.open_side = _open_sides(surface.triangles, len(surface.points))
+
+    def pairs(
+        self, points: Doubles, normals: Doubles, least_cosine: float, farthest: float
+    ) -> tuple[npt.NDArray[np.bool_], Doubles, Doubles]:
+        """The closest points of the surface.
+
+        Args:
+            points, normals: float64[n, 3] of what is laid onto it.
+            least_cosine: between the normals of a pair.
+            farthest: distance.
+
+        Returns:
+            bool[n] whether there is one, within the surface and not at its border; float64[n, 3]
+            points; float64[n, 3] normals.
+        """
+        triangle, shares, _ = self.closest.nearest(points, normals, least_cosine, farthest)
+        at = np.maximum(triangle, 0)
+        edge = (self.open_side[at] & (shares < 1e-4)).any(axis=1)
+        return (triangle >= 0) & ~edge, self.surface.at(at, shares), self.normals[at]
+
+
+def _open_sides(triangles: Ints, count: int) -> npt.NDArray[np.bool_]:
+    sides = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]], axis=2).astype(np.int64)
+    key = sides[..., 0] * count + sides[..., 1]
+    _, back, times = np.unique(key, return_inverse=True, return_counts=True)
+    return np.asarray(times[back].reshape(key.shape) == 1)
+
+
+@dataclass(frozen=True)
+class Step:
+    """How a part of a fit is done.
+
+    Attributes:
+        rounds: of pairs.
+        reach: cm of the form: a pair farther apart counts little.
+        vertices: of the form that are paired.
+        parts: how many of the form's parts may change.
+        prior: how strongly these are held; 1 as likely as the model says.
+        least_cosine: between the normals of a pair.
+        expressions: whether these may change.
+    """
+
+    rounds: int
+    reach: float
+    vertices: int
+    parts: int
+    prior: float = 1.0
+    least_cosine: float = 0.3
+    expressions: bool = True
+
+
+PLACE = (
+    Step(3, 4.0, 200, 0, expressions=False),
+    Step(6, 4.0, 300, 0, expressions=False),
+)
+ROUGH = (Step(6, 2.0, 500, 6, 4.0), Step(6, 1.2, 700, 14, 3.0))
+FINE = (
+    Step(6, 0.9, 1600, 24, 2.0, 0.4),
+    Step(6, 0.6, 4000, 40, 1.0, 0.5),
+    Step(6, 0.4, 4000, 40, 0.5, 0.5),
+)
+
+
+def fit(
+    target: Target,
+    pose: Pose,
+    steps: tuple[Step, ...],
+    held: Held | None = None,
+    weights: Doubles | None = None,
+) -> Pose:
+    """A form laid onto a surface, from a pose that is near.
+
+    Args:
+        target: the surface.
+        pose: to begin with; it stays as it is.
+        steps: one after the other.
+        held: vertices of the form whose places are known.
+        weights: float64[V], how much each vertex of the form says; None: as the form has it.
+    """
+    form = head_form()
+    if weights is not None:
+        form = replace(form, weights=weights)
+    for step in steps:
+        chosen = (
+            _chosen(form, step.vertices)
+            if weights is None
+            else np.flatnonzero(weights[: form.skin])
+        )
+        for _ in range(step.rounds):
+            pose = _round(form, target, pose, step, chosen, held)
+    return pose
+
+
+@dataclass(frozen=True)
+class Held:
+    """Vertices of the form whose places are known.
+
+    Attributes:
+        vertices: int64[n].
+        points: float64[n, 3] in the surface's space.
+        weights: float64[n]; 1: as much as a pair of the middle of the face.
+    """
+
+    vertices: Ints
+    points: Doubles
+    weights: Doubles
+
+
+def _chosen(form: HeadForm, count: int) -> Ints:
+    """int64[n]: vertices spread over the form, denser where it says more."""
+    if count >= form.skin:
+        return np.arange(form.skin)
+    areas = np.zeros(form.skin)
+    size = np.linalg.norm(Surface(form.mean, form.triangles).face_normals(), axis=1)
+    for k in range(3):
+        np.add.at(areas, form.triangles[:, k], size)
+    share = np.sqrt(areas) * form.weights[: form.skin]
+    steps = np.cumsum(share) / share.sum() * count
+    return np.flatnonzero(np.diff(np.floor(steps), prepend=-1.0) > 0)
+
+
+def form_normals(form: HeadForm, shaped: Doubles) -> Doubles:
+    """float64[skin, 3], normals of a form in its own space.
+
+    Args:
+        form: its triangles count.
+        shaped: float64[V, 3].
+    """
+    a, b, c = (shaped[form.triangles[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    order, first = _around()
+    out = np.add.reduceat(across[order // 3], first, axis=0)
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))
+
+
+@cache
+def _around() -> tuple[Ints, Ints]:
+    """Corners of triangles in the order of their vertices, and where each vertex begins."""
+    flat = head_form().triangles.ravel()
+    order = np.argsort(flat, kind="stable")
+    return order, np.searchsorted(flat[order], np.arange(head_form().skin))
+
+
+@cache
+def _mean_normals() -> Doubles:
+    return form_normals(head_form(), head_form().mean)
+
+
+def pose_normals(form: HeadForm, pose: Pose, shaped: Doubles) -> Doubles:
+    """float64[skin, 3], normals of a form in the surface's space.
+
+    Args:
+        form: the model.
+        pose: of it.
+        shaped: float64[V, 3], the form that the pose has.
+    """
+    as_mean = not pose.parts.any() and not pose.expressions.any()
+    normals = _mean_normals() if as_mean else form_normals(form, shaped)
+    return np.asarray(normals @ pose.rotation.T)
+
+
+def _round(
+    form: HeadForm, target: Target, pose: Pose, step: Step, chosen: Ints, held: Held | None
+) -> Pose:
+    shaped = form.shaped(pose.parts, pose.expressions)
+    placed = pose.place(shaped[chosen])
+    normals = pose_normals(form, pose, shaped)[chosen]
+    found, near, across = target.pairs(
+        placed, normals, step.least_cosine, 3.0 * step.reach * pose.scale
+    )
+    used = chosen[found]
+    if len(used) < 30:
+        return pose
+    # All in the form's space: a surface's point goes there by the pose as it is.
+    away = shaped[used] - pose.back(near[found])
+    across = across[found] @ pose.rotation
+    weight = form.weights[used] / (1 + (np.linalg.norm(away, axis=1) / step.reach) ** 2) ** 2
+    system = _System(form, shaped, step)
+    system.add(used, away, across, weight)
+    if held is not None:
+        apart = shaped[held.vertices] - pose.back(held.points)
+        system.add(held.vertices, apart, None, held.weights)
+    return system.solved(pose)
+
+
+class _System:
+    """The normal equations of a round: turn, shift and growth, then parts, then expressions."""
+
+    def __init__(self, form: HeadForm, shaped: Doubles, step: Step) -> None:
+        self.form, self.shaped, self.step = form, shaped, step
+        self.parts = step.parts
+        self.more = len(form.expressions) if step.expressions else 0
+        size = 7 + self.parts + self.more
+        self.left, self.right = np.zeros((size, size)), np.zeros(size)
+
+    def add(self, used: Ints, away: Doubles, across: Doubles | None, weight: Doubles) -> None:
+        """Pairs: what is left of them shall go.
+
+        Args:
+            used: int64[n], vertices of the form.
+            away: float64[n, 3], from their partners to them.
+            across: float64[n, 3], normals; None: each direction counts alike.
+            weight: float64[n].
+        """
+        ways = self._ways(used)
+        amount = _ALIKE * weight / _NOISE**2
+        if across is not None:
+            slope = np.einsum("vdi,vd->vi", ways, across)
+            self.left += (slope * amount[:, None]).T @ slope
+            self.right -= (slope * amount[:, None]).T @ np.einsum("vd,vd->v", away, across)
+            amount = amount * _ALONG**2
+        for k in range(3):
+            self.left += (ways[:, k] * amount[:, None]).T @ ways[:, k]
+            self.right -= (ways[:, k] * amount[:, None]).T @ away[:, k]
+
+    def _ways(self, used: Ints) -> Doubles:
+        """float64[n, 3, size]: where each unknown takes the vertices."""
+        points, form = self.shaped[used], self.form
+        turn = np.cross(np.eye(3)[None], points[:, None])  # [n, axis, 3]
+        out = [turn.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (len(used), 3, 3))]
+        out += [points[:, :, None], form.parts[: self.parts, used].transpose(1, 2, 0)]
+        if self.more:
+            out.append(form.expressions[:, used].transpose(1, 2, 0))
+        return np.concatenate(out, axis=2)
+
+    def solved(self, pose: Pose) -> Pose:
+        """The pose after the step."""
+        values = np.concatenate([pose.parts[: self.parts], pose.expressions[: self.more]])
+        hold = np.full(len(values), float(self.step.prior))
+        hold[self.parts :] *= 4.0  # an expression of 0.5 is as seldom as a part of 1
+        at = np.arange(7, 7 + len(values))
+        self.left[at, at] += hold
+        self.right[at] -= hold * values
+        self.left[np.arange(7), np.arange(7)] += 1e-6 * np.trace(self.left) / len(self.left)
+        change = np.linalg.solve(self.left, self.right)
+        values = values + change[7:]
+        parts, expressions = pose.parts.copy(), pose.expressions.copy()
+        parts[: self.parts] = np.clip(values[: self.parts], -_BEYOND, _BEYOND)
+        expressions[: self.more] = np.clip(values[self.parts :], *_OPEN)
+        grow = float(np.clip(1 + change[6], 0.7, 1.4))
+        scale = pose.scale * grow
+        shift = pose.shift + pose.scale * pose.rotation @ change[3:6]
+        rotation = pose.rotation @ _turn(change[:3])
+        return replace(
+            pose, rotation=rotation, scale=scale, shift=shift, parts=parts, expressions=expressions
+        )
+
+
+def _turn(vector: Doubles) -> Doubles:
+    """float64[3, 3]: the rotation about a vector by its length, half a radian at most."""
+    angle = float(np.linalg.norm(vector))
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = vector / angle
+    angle = min(angle, 0.5)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)

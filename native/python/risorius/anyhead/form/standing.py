@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: MIT
+"""Where in a surface a head is, of any unit and direction: the best of many guesses."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...author.geometry.skeleton import Doubles
+from ..surface import Surface
+from .fitting import FINE, PLACE, ROUGH, Held, Pose, Target, fit, pose_normals
+from .heads import HeadForm, head_form
+
+TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
+_SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # of the surface's height that the head may have
+_PLACED, _KEPT, _TRIED = 48, 10, 3  # guesses that go on to the next stage
+_WORSE = 1.6  # a guess so much worse than the best one is none
+_OBLIQUE = 48
+SURE, NO_FACE = 0.13, 0.21  # errors up to which a head is one, and from which it is none
+_GRIDS = (400, 280, 200, 140, 100, 70, 50)  # cells along the longest side
+_CELLS = 9000
+_FAR = 1.5  # cm of the form: farther counts as this far
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A form in a surface.
+
+    Attributes:
+        pose: of the form.
+        error: see `misfit`, and a little for parts that are seldom; cm of the form.
+    """
+
+    pose: Pose
+    error: float
+
+
+def turns(up: Doubles | None, front: Doubles | None) -> list[Doubles]:
+    """float64[3, 3] each: from the form to the surface, along the axes.
+
+    Args:
+        up, front: float64[3], where the surface has them; None: anywhere.
+    """
+    axes = [sign * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    out = []
+    for high, ahead in itertools.product(axes, axes):
+        if abs(high @ ahead) > 0.5:
+            continue
+        if (up is None or high @ up > 0.7) and (front is None or ahead @ front > 0.7):
+            out.append(np.stack([np.cross(high, ahead), high, ahead], axis=1))
+    return out
+
+
+def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -> list[Pose]:
+    """Heads of several sizes at the top of a surface.
+
+    Args:
+        points: float64[n, 3] of it.
+        turn: float64[3, 3], from the form to the surface.
+        shares: of the surface's height that the head may have.
+    """
+    stood = points @ turn
+    low, high = stood.min(axis=0), stood.max(axis=0)
+    out = []
+    for share in shares:
+        tall = share * (high[1] - low[1])
+        head = stood[stood[:, 1] > high[1] - tall]
+        scale = tall / (TOP - CHIN)
+        middle = (np.quantile(head, 0.02, axis=0) + np.quantile(head, 0.98, axis=0)) / 2
+        if np.ptp(head[:, 0]) > 2.5 * tall or np.ptp(head[:, 2]) > 3.0 * tall:
+            middle = np.median(head, axis=0)
+        goal = np.array([middle[0], high[1] - scale * TOP, middle[2]])
+        shift = turn @ (goal - scale * np.array([0.0, 0.0, (BACK + FRONT) / 2]))
+        out.append(Pose(turn, scale, shift))
+    return out
+
+
+def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> float:
+    """How far three quarters of the middle of the face are from a surface at most, cm of the form.
+
+    Holes, hair and inner sides take what is left of it.
+
+    Args:
+        target: the surface.
+        pose: of the form.
+        form: it.
+        count: of vertices that are looked at.
+    """
+    face = np.flatnonzero(form.weights[: form.skin] > 0.6)
+    face = face[:: max(1, len(face) // count)]
+    shaped = form.shaped(pose.parts, pose.expressions)
+    normals, points = pose_normals(form, pose, shaped)[face], pose.place(shaped[face])
+    found, near, _ = target.pairs(points, normals, 0.5, 2 * _FAR * pose.scale)
+    away = np.linalg.norm(points - near, axis=1) / pose.scale
+    return float(np.quantile(np.where(found, np.minimum(away, _FAR), _FAR), 0.75))
+
+
+def _strange(pose: Pose) -> float:
+    """How unlikely the parts of a form are, cm: what a fit pays for them."""
+    return 0.02 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
+
+
+def find_standing(
+    target: Target,
+    up: Doubles | None = None,
+    front: Doubles | None = None,
+    held: Held | None = None,
+) -> list[Standing]:
+    """The likeliest places of a head in a surface, the best first.
+
+    Args:
+        target: the surface.
+        up, front: float64[3], where it has them; None: anywhere.
+        held: vertices of the form whose places are known.
+    """
+    coarse = Target(coarsened(target.surface))
+    best = _best(target, coarse, turns(up, front), held)
+    if best[0].error > SURE and up is None and front is None:
+        best = sorted(best + _best(target, coarse, oblique(), held), key=lambda s: s.error)
+    return best
+
+
+def oblique() -> list[Doubles]:
+    """float64[3, 3] each: turns spread evenly over all there are (Alexa 2022)."""
+    k = np.arange(_OBLIQUE) + 0.5
+    share = k / _OBLIQUE
+    a, b = 2 * np.pi * k / 2**0.5, 2 * np.pi * k / 1.533751168755204288118041
+    quarter = np.stack(
+        [
+            np.sqrt(share) * np.sin(a), np.sqrt(share) * np.cos(a),
+            np.sqrt(1 - share) * np.sin(b), np.sqrt(1 - share) * np.cos(b),
+        ],
+        axis=1,
+    )  # fmt: skip
+    out = []
+    for x, y, z, w in quarter:
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        out.append(np.eye(3) + 2 * w * cross + 2 * cross @ cross)
+    return out
+
+
+def _best(
+    target: Target, coarse: Target, ways: Sequence[Doubles], held: Held | None
+) -> list[Standing]:
+    """The best places of a head that stands in one of several ways, the best first."""
+    form = head_form()
+    poses = [g for turn in ways for g in guesses(coarse.surface.points, turn)]
+    rated = _rated(coarse, [fit(coarse, pose, PLACE[:1], held) for pose in poses], form, 200)
+    placed = [fit(coarse, s.pose, PLACE[1:], held) for s in rated[:_PLACED]]
+    rated = _apart(_rated(coarse, placed, form, 300))[:_KEPT]
+    rated = _apart(_rated(coarse, [fit(coarse, s.pose, ROUGH, held) for s in rated], form, 900))
+    rated = [s for s in rated if s.error < _WORSE * rated[0].error][:_TRIED]
+    best = [fit(target, s.pose, FINE, held) for s in rated]
+    return _rated(target, best, form, 2000)
+
+
+def coarsened(surface: Surface) -> Surface:
+    """A surface of few vertices: those of a cell of a grid become one.
+
+    Args:
+        surface: it stays as it is.
+    """
+    used = np.unique(surface.triangles)
+    low = surface.points[used].min(axis=0)
+    extent = float(np.ptp(surface.points[used], axis=0).max())
+    for parts in _GRIDS:
+        place = np.floor((surface.points - low) / (extent / parts)).astype(np.int64)
+        key = (place[:, 0] * (parts + 1) + place[:, 1]) * (parts + 1) + place[:, 2]
+        _, back = np.unique(key, return_inverse=True)
+        count = int(back.max()) + 1
+        if count <= _CELLS:
+            break
+    sums = np.stack([np.bincount(back, surface.points[:, k], count) for k in range(3)], axis=1)
+    points = sums / np.bincount(back, minlength=count)[:, None]
+    corners = back[surface.triangles]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    kept = corners[whole]
+    own = np.unique(kept)
+    return Surface(points[own], np.searchsorted(own, kept))
+
+
+def _rated(target: Target, poses: Sequence[Pose], form: HeadForm, count: int) -> list[Standing]:
+    rated = [Standing(p, misfit(target, p, form, count) + _strange(p)) for p in poses]
+    return sorted(rated, key=lambda s: s.error)
+
+
+def _apart(rated: Sequence[Standing]) -> list[Standing]:
+    """Without what is nearly the same as a better one."""
+    out: list[Standing] = []
+    for one in rated:
+        size = 10.0 * one.pose.scale
+        for other in out:
+            off = np.linalg.norm(one.pose.shift - other.pose.shift) / size
+            turned = np.trace(one.pose.rotation.T @ other.pose.rotation)
+            grown = abs(np.log(one.pose.scale / other.pose.scale))
+            if off < 0.15 and turned > 2.9 and grown < 0.15:
+                break
+        else:
+            out.append(one)
+    return out

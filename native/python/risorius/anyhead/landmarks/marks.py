@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""The landmarks of one head, each found, moved by hand or missing, and their file."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...author.geometry.skeleton import Doubles
+from ...base.errors import RisoriusError
+from ...base.given import GivenError, finite, shown
+from ...base.reading import read_file
+from ...base.words import joined
+from .names import landmark_words, needed_landmarks
+
+FOUND, MOVED, MISSING = "found", "moved by hand", "missing"
+_FORMAT, _VERSION = "risorius landmarks", 1
+_MOST_BYTES = 1 << 20
+
+
+class LandmarkError(RisoriusError):
+    """A head whose landmarks cannot be found, or a file of them that is not as it should be."""
+
+    code = "landmarks"
+
+
+@dataclass
+class Landmarks:
+    """Places of a face by name, in the space of the surface they were found in.
+
+    Attributes:
+        points: float64[3] by name.
+        how: FOUND or MOVED for each of these.
+        notes: a sentence each, of what a person shall know.
+    """
+
+    points: dict[str, Doubles] = field(default_factory=dict)
+    how: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def missing(self) -> list[str]:
+        """Names of those that have no place, in the order of names.toml."""
+        return [name for name in landmark_words() if name not in self.points]
+
+    def moved(self, name: str, point: Doubles) -> None:
+        """A person gives a place to a landmark.
+
+        Args:
+            name: one of names.toml.
+            point: float64[3].
+        """
+        self.points[name] = np.asarray(point, np.float64)
+        self.how[name] = MOVED
+
+    def require(self, where: str) -> None:
+        """Ends where a landmark is missing that a registration needs.
+
+        Args:
+            where: what the error calls the head.
+
+        Raises:
+            LandmarkError: names each of them.
+        """
+        lost = [landmark_words()[n] for n in self.missing if n in needed_landmarks()]
+        if lost:
+            one = len(lost) == 1
+            raise LandmarkError(
+                f"{where}: {joined(lost)} {'was' if one else 'were'} not found: give "
+                f"{'it' if one else 'them'} with --landmarks FILE or move "
+                f"{'it' if one else 'them'} in Blender"
+            )
+
+
+def landmarks_path(head: Path) -> Path:
+    """Where the landmarks of a head's file are kept: beside it."""
+    return head.with_name(f"{head.stem}.landmarks.json")
+
+
+def landmarks_text(landmarks: Landmarks) -> str:
+    """The JSON of landmarks; missing ones are in it with no place."""
+    rows: dict[str, Any] = {}
+    for name in landmark_words():
+        if name in landmarks.points:
+            point = [round(float(x), 6) for x in landmarks.points[name]]
+            rows[name] = {"how": landmarks.how[name], "point": point}
+        else:
+            rows[name] = {"how": MISSING}
+    table = {"format": _FORMAT, "version": _VERSION, "landmarks": rows}
+    return json.dumps(table, indent=1) + "\n"
+
+
+def read_landmarks(path: str | os.PathLike[str]) -> Landmarks:
+    """Landmarks of a file.
+
+    Args:
+        path: as `landmarks_text` writes it; what it does not name is missing.
+
+    Raises:
+        LandmarkError: it is none, with what is wrong.
+        OSError: it cannot be read.
+    """
+    try:
+        table = json.loads(read_file(path, _MOST_BYTES))
+    except (ValueError, RecursionError) as error:
+        raise LandmarkError(f"{path}: JSON was expected: {error}") from None
+    if not isinstance(table, dict) or table.get("format") != _FORMAT:
+        raise LandmarkError(f'{path}: format: "{_FORMAT}" was expected')
+    if table.get("version") != _VERSION:
+        found = shown(table.get("version"))
+        raise LandmarkError(f"{path}: version: {_VERSION} was expected, found {found}")
+    rows = table.get("landmarks")
+    if not isinstance(rows, dict):
+        raise LandmarkError(f"{path}: landmarks: a table was expected, found {shown(rows)}")
+    out = Landmarks()
+    for name, row in rows.items():
+        _take(out, f"{path}: landmarks.{name}", name, row)
+    return out
+
+
+def _take(out: Landmarks, where: str, name: str, row: object) -> None:
+    if name not in landmark_words():
+        raise LandmarkError(f"{where}: there is no landmark of this name")
+    how = row.get("how", MOVED) if isinstance(row, dict) else None
+    if not isinstance(row, dict) or how not in (FOUND, MOVED, MISSING):
+        raise LandmarkError(f'{where}: how: "{FOUND}", "{MOVED}" or "{MISSING}" was expected')
+    if how == MISSING:
+        return
+    point = row.get("point")
+    if not isinstance(point, list) or len(point) != 3:
+        raise LandmarkError(f"{where}: point: three numbers were expected, found {shown(point)}")
+    try:
+        out.points[name] = np.array([finite(value) for value in point])
+    except GivenError as error:
+        raise LandmarkError(f"{where}: point: {error}") from None
+    out.how[name] = str(how)

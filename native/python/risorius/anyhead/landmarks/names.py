@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+"""The named places of a face, and how sentences call them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+from ...base import toml
+
+
+@cache
+def landmark_words() -> Mapping[str, str]:
+    """How sentences call each landmark, by name; those of the left before those of the right."""
+    out: dict[str, str] = {}
+    for name, row in _table().items():
+        out[name] = row["words"]
+        if name.endswith("_L"):
+            out[other_side(name)] = row["words"].replace(" left ", " right ")
+    return out
+
+
+@cache
+def needed_landmarks() -> frozenset[str]:
+    """Names of those without which a registration cannot begin."""
+    needed = {name for name, row in _table().items() if row.get("needed")}
+    return frozenset(needed | {other_side(name) for name in needed})
+
+
+def other_side(name: str) -> str:
+    """The name of the landmark across the face; its own of one in the middle."""
+    swap = {"_L": "_R", "_R": "_L"}
+    return name[:-2] + swap[name[-2:]] if name[-2:] in swap else name
+
+
+@cache
+def _table() -> dict[str, dict[str, str]]:
+    return toml.parse(files(__package__).joinpath("names.toml").read_text(encoding="utf-8"))

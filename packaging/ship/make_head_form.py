@@ -1,0 +1,355 @@
+# SPDX-License-Identifier: MIT
+"""Makes the model of the form of heads that the package finds faces with: to be run again where
+names.toml of the landmarks or this file changes. A minute, in the environment of
+packaging/setup.sh; the wheel is built anew after it.
+
+    python packaging/ship/make_head_form.py
+
+The heads are drawn at random from the CC0 data of the sample people: age, gender, origin, build
+and some three hundred features, some of them far beyond what people have, as drawings have it.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from risorius.base import toml
+from risorius.files import fileio
+from risorius_people.body import group_indices
+from risorius_people.people import ORIGINS, Person
+from risorius_people.source import FACE_UNITS, TARGETS, BaseMesh, Source, fetch
+
+Doubles = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+HEADS, COMPONENTS, SEED = 1600, 40, 56
+STYLISED = 0.25  # share of heads whose features go beyond people's
+CUT, WIDE = 5.75, 0.95  # of the base mesh, decimetres: below is no neck, beyond are shoulders
+FEATURES = (
+    "eyes", "asym", "ears", "mouth", "nose", "head", "neck", "cheek", "chin", "forehead",
+    "eyebrows",
+)  # fmt: skip
+ENDS = (
+    ("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"),
+    ("concave", "convex"), ("compress", "uncompress"),
+)  # fmt: skip
+EXPRESSIONS = {
+    "jaw_open": ("jawOpen",),
+    "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
+    "smile": ("mouthSmileLeft", "mouthSmileRight"),
+    "pucker": ("mouthPucker",),
+    "wide": ("eyeWideLeft", "eyeWideRight"),
+}
+DIRECTIONS = 40  # from which a head is looked at, for what is seen of it
+PIXELS = 220  # a decimetre
+PACKAGE = Path(__file__).parents[2] / "native" / "python" / "risorius" / "anyhead"
+
+
+def quads_of(base: BaseMesh, *groups: str) -> Ints:
+    return np.array([[c[0] for c in face] for group in groups for face in base.faces[group]])
+
+
+def triangles_of(quads: Ints) -> Ints:
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def seen(points: Doubles, triangles: Ints) -> NDArray[np.bool_]:
+    """Which triangles [T] are seen from one of many directions around."""
+    out = np.zeros(len(triangles), bool)
+    k = np.arange(DIRECTIONS) + 0.5
+    height, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + 5**0.5) * k
+    for y, angle in zip(height, turn, strict=True):
+        front = np.array(
+            [np.cos(angle) * (1 - y * y) ** 0.5, y, np.sin(angle) * (1 - y * y) ** 0.5]
+        )
+        side = np.cross([0.0, 1.0, 0.0], front)
+        side /= np.linalg.norm(side)
+        turned = points @ np.stack([side, np.cross(front, side), front]).T
+        out[np.unique(nearest_triangles(turned, triangles))] = True
+    return out
+
+
+def nearest_triangles(points: Doubles, triangles: Ints) -> Ints:
+    """The triangles that a picture along -z shows: those that face it, drawn from behind."""
+    corners = points[triangles]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+    low = corners[:, :, :2].reshape(-1, 2).min(axis=0)
+    grid = (corners[:, :, :2] - low) * PIXELS
+    size = np.ceil(grid.reshape(-1, 2).max(axis=0)).astype(int) + 2
+    depth, shown = np.full(size, -np.inf), np.full(size, -1)
+    for t in np.flatnonzero(np.abs(across) > 1e-12):
+        a, b, c = grid[t]
+        first = np.floor(grid[t].min(axis=0)).astype(int)
+        last = np.ceil(grid[t].max(axis=0)).astype(int) + 1
+        x, y = np.mgrid[first[0] : last[0], first[1] : last[1]]
+        whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        u = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / whole
+        v = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / whole
+        z = corners[t, 0, 2] * (1 - u - v) + corners[t, 1, 2] * u + corners[t, 2, 2] * v
+        window = (slice(first[0], last[0]), slice(first[1], last[1]))
+        nearer = (u >= 0) & (v >= 0) & (u + v <= 1) & (z > depth[window])
+        depth[window][nearer] = z[nearer]
+        shown[window][nearer] = t if across[t] > 0 else -1
+    return np.asarray(shown[shown >= 0])
+
+
+class Heads:
+    """Draws heads from the data."""
+
+    def __init__(self) -> None:
+        self.source = Source(fetch(offline=False))
+        self.base = self.source.base_mesh()
+        self.count = len(self.base.positions)
+        self.groups = group_indices(self.base)
+        self.kept = np.arange(self.count)
+        self._read: dict[str, Doubles] = {}
+        self.axes = self._axes()
+
+    def shape(self, name: str) -> Doubles:
+        """float64[kept, 3] of a target."""
+        if name not in self._read:
+            self._read[name] = self.source.target(name, self.count)[self.kept].astype(np.float32)
+        return self._read[name]
+
+    def _axes(self) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+        """Each feature's two ends, with the names of both sides where it has two."""
+        names = {
+            n.removeprefix(TARGETS).removesuffix(".target.gz")
+            for n in self.source._names
+            if n.startswith(TARGETS) and n.endswith(".target.gz")
+        }
+        chosen = {n for n in names if n.split("/")[0] in FEATURES and "asymm-" not in n}
+        axes: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+        for name in sorted(chosen):
+            last = name.rpartition("/")[2]
+            if last.startswith("r-"):
+                continue
+            for low, high in ENDS:
+                if last.endswith(f"-{high}") and name.removesuffix(high) + low in chosen:
+                    axes.append((self._sided(name.removesuffix(high) + low), self._sided(name)))
+                    break
+            else:
+                if not any(
+                    last.endswith(f"-{low}") and name.removesuffix(low) + high in chosen
+                    for low, high in ENDS
+                ):
+                    axes.append(((), self._sided(name)))
+        return axes
+
+    @staticmethod
+    def _sided(name: str) -> tuple[str, ...]:
+        folder, _, last = name.partition("/")
+        return (name, f"{folder}/r-{last[2:]}") if last.startswith("l-") else (name,)
+
+    def draw(self, dice: np.random.Generator) -> Doubles:
+        """float64[kept, 3] of a random head, decimetres."""
+        out = self.base.positions[self.kept].copy()
+        shares = dice.dirichlet(np.full(len(ORIGINS), 0.6))
+        person = Person(
+            name="", gender=str(dice.choice(["female", "male"])), age=int(dice.integers(2, 91)),
+            origin=dict(zip(ORIGINS, shares, strict=True)), skin=(0, 0, 0), flush=(0, 0, 0),
+            lids=(0, 0, 0), lips=(0, 0, 0), hair=(0, 0, 0), brows=(0, 0, 0), beard=0,
+            iris=((0, 0, 0), (0, 0, 0)), muscle=dice.uniform(), weight=dice.uniform(),
+        )  # fmt: skip
+        for name, weight in person.shape().items():
+            out += weight * self.shape(f"{TARGETS}{name}.target.gz")
+        strength = dice.uniform(1.0, 2.0) if dice.uniform() < STYLISED else 0.6
+        for low, high in self.axes:
+            value = dice.normal() * strength * (0.5 if dice.uniform() < 0.5 else 0.1)
+            own = dice.normal() * 0.08
+            names = high if value > 0 or not low else low
+            for k, name in enumerate(names):
+                weight = abs(value) + (own if k else -own)
+                out += weight * self.shape(f"{TARGETS}{name}.target.gz")
+        return out
+
+    def expression(self, names: tuple[str, ...]) -> Doubles:
+        """float64[kept, 3] of units of the face together."""
+        return np.sum([self.shape(f"{FACE_UNITS}{name}.target") for name in names], axis=0)
+
+
+def aligned(points: Doubles, like: Doubles, weight: Doubles) -> tuple[Doubles, Doubles, float]:
+    """The similarity that brings points onto others: points, rotation [3, 3], scale."""
+    share = (weight / weight.sum())[:, None]
+    middle, goal = (share * points).sum(axis=0), (share * like).sum(axis=0)
+    u, s, vt = np.linalg.svd((share * (points - middle)).T @ (like - goal))
+    flip = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    rotation = (u * flip) @ vt
+    scale = float((s * flip).sum() / (share * (points - middle) ** 2).sum())
+    return (points - middle) @ rotation * scale + goal, rotation, scale
+
+
+def with_eyes(points: Doubles, eyes: list[Ints]) -> Doubles:
+    """Points and, behind them, the middle and the foremost place of each eye."""
+    more = []
+    for eye in eyes:
+        middle = (points[eye].min(axis=0) + points[eye].max(axis=0)) / 2
+        front = np.array([middle[0], middle[1], points[eye, 2].max()])
+        more += [middle, front]
+    return np.concatenate([points, more])
+
+
+def packed(values: Doubles, kind: type) -> tuple[NDArray[np.generic], Doubles]:
+    """Whole numbers and what each row is multiplied with."""
+    flat = values.reshape(len(values), -1)
+    scale = np.abs(flat).max(axis=1) / np.iinfo(kind).max
+    return np.round(flat / scale[:, None]).astype(kind).reshape(values.shape), scale
+
+
+def region_weights(points: Doubles, ears: NDArray[np.bool_]) -> Doubles:
+    """How much each vertex says of where a face is: the middle of the face 1, neck and ears little.
+
+    Args:
+        points: float64[V, 3] in cm, 0 between the eyes.
+        ears: bool[V].
+    """
+    x, y, z = points.T
+    away = np.sqrt((x / 6.5) ** 2 + ((y + 3.0) / 8.0) ** 2)
+    face = np.clip(1.6 - away, 0.15, 1.0) * (z > -6.0)
+    out = np.maximum(face, 0.15)
+    out[ears] = 0.15
+    out[y < -12.0] = 0.06
+    return np.asarray(out)
+
+
+def main() -> None:
+    """Write native/python/risorius/anyhead/form/heads.npz."""
+    heads = Heads()
+    base = heads.base.positions
+    skin = triangles_of(quads_of(heads.base, "body"))
+    eyeballs = ["helper-l-eye", "helper-r-eye"]
+    whole = np.concatenate([skin, triangles_of(quads_of(heads.base, *eyeballs))])
+    inside = (base[whole][:, :, 1] > CUT).all(axis=1) & (np.abs(base[whole][:, :, 0]) < WIDE).all(
+        axis=1
+    )
+    whole = whole[inside]
+    shown = whole[seen(base, whole)]
+    balls = np.concatenate([heads.groups[g] for g in eyeballs])
+    shown = shown[~np.isin(shown, balls).any(axis=1)]
+    own = np.unique(shown)
+    heads.kept = np.concatenate([own, balls])
+    heads._read.clear()
+    triangles = np.searchsorted(own, shown)
+    half = len(balls) // 2
+    eyes = [len(own) + np.arange(half), len(own) + half + np.arange(half)]
+    dice = np.random.default_rng(SEED)
+    drawn = [heads.draw(dice) for _ in range(HEADS)]
+    middle = np.mean(drawn[:200], axis=0)
+    root = (middle[eyes[0]].mean(axis=0) + middle[eyes[1]].mean(axis=0)) / 2
+    middle = with_eyes((middle - root) * 10.0, eyes)
+    ears = np.isin(own, ear_vertices(heads))
+    weights = region_weights(middle[: len(own)], ears)
+    rows = np.concatenate([np.arange(len(own)), np.arange(len(middle) - 4, len(middle))])
+    samples = [with_eyes((d - root) * 10.0, eyes)[rows] for d in drawn]
+    full = np.concatenate([weights, np.ones(4)])
+    mean = middle[rows]
+    for _ in range(3):
+        fitted = [aligned(s, mean, full)[0] for s in samples]
+        mean = np.mean(fitted, axis=0)
+    mean = symmetric(mean, mirror_of(base[own]))
+    table = np.stack(fitted) - mean
+    share = np.sqrt(np.maximum(full, 0.1))[None, :, None]
+    left, sizes, right = np.linalg.svd((table * share).reshape(HEADS, -1), full_matrices=False)
+    print("variance kept:", (sizes[:COMPONENTS] ** 2).sum() / (sizes**2).sum())
+    spread = sizes[:COMPONENTS] / HEADS**0.5
+    parts = right[:COMPONENTS].reshape(COMPONENTS, -1, 3) / share * spread[:, None, None]
+    rest = np.sqrt(
+        ((table - np.einsum("hk,kvi->hvi", left[:, :COMPONENTS] * HEADS**0.5, parts)) ** 2).sum(2)
+    )
+    print(
+        "rest, mm:",
+        10 * rest[:, weights_face(full)].mean(),
+        "of",
+        10 * np.sqrt((table**2).sum(2))[:, weights_face(full)].mean(),
+    )
+    moved = np.stack(
+        [expression(heads, units, eyes, root, mean, full, rows) for units in EXPRESSIONS.values()]
+    )
+    write(mean, parts, moved, triangles, full, mirror_of(base[own]), own)
+
+
+def weights_face(weights: Doubles) -> NDArray[np.bool_]:
+    return weights > 0.9
+
+
+def ear_vertices(heads: Heads) -> Ints:
+    """Vertices of the base mesh that the size of an ear moves."""
+    moved = np.zeros(heads.count)
+    for side in "lr":
+        way = heads.source.target(f"{TARGETS}ears/{side}-ear-scale-incr.target.gz", heads.count)
+        moved = np.maximum(moved, np.linalg.norm(way, axis=1))
+    return np.flatnonzero(moved > 0.02)
+
+
+def mirror_of(points: Doubles) -> Ints:
+    """The vertex at each one's mirror image."""
+    out = np.empty(len(points), np.int64)
+    for k, point in enumerate(points * [-1.0, 1.0, 1.0]):
+        out[k] = ((points - point) ** 2).sum(axis=1).argmin()
+    return out
+
+
+def symmetric(mean: Doubles, mirror: Ints) -> Doubles:
+    """The mean of a form and its mirror image; the last four rows are those of the eyes."""
+    count = len(mirror)
+    other = np.concatenate([mirror, count + np.array([2, 3, 0, 1])])
+    return np.asarray((mean + mean[other] * [-1.0, 1.0, 1.0]) / 2)
+
+
+def expression(
+    heads: Heads, units: tuple[str, ...], eyes: list[Ints], root: Doubles, mean: Doubles,
+    weights: Doubles, rows: Ints,
+) -> Doubles:  # fmt: skip
+    """float64[V, 3]: what an expression adds to the mean form, in its place and size."""
+    rest = heads.base.positions[heads.kept]
+    # The units are made for the grown-up face of the data, which the base mesh is not.
+    person = Person("", "male", 25, {"caucasian": 1.0}, *[(0, 0, 0)] * 6, 0, ((0, 0, 0), (0, 0, 0)))
+    for name, weight in person.shape().items():
+        rest = rest + weight * heads.shape(f"{TARGETS}{name}.target.gz")
+    still = with_eyes((rest - root) * 10.0, eyes)[rows]
+    _, rotation, scale = aligned(still, mean, weights)
+    moved = heads.expression(units) * 10.0
+    moved = np.concatenate([moved, np.zeros((4, 3))])[rows_of(rows, len(moved))]
+    return moved @ rotation * scale
+
+
+def rows_of(rows: Ints, count: int) -> Ints:
+    """The rows of skin, then the four of the eyes that follow all others."""
+    return np.concatenate([rows[:-4], count + np.arange(4)])
+
+
+def write(
+    mean: Doubles, parts: Doubles, moved: Doubles, triangles: Ints, weights: Doubles,
+    mirror: Ints, own: Ints,
+) -> None:  # fmt: skip
+    names = toml.read(PACKAGE / "landmarks" / "names.toml")
+    places, labels = [], []
+    for name, row in names.items():
+        at = int(np.searchsorted(own, row["vertex"]))
+        if at >= len(own) or own[at] != row["vertex"]:
+            raise SystemExit(f"names.toml, {name}: vertex {row['vertex']} is not seen")
+        for label, vertex in ((name, at), (name[:-1] + "R", int(mirror[at]))):
+            if label not in labels:
+                labels.append(label)
+                places.append(vertex)
+            if not name.endswith("_L"):
+                break
+    form, scale = packed(np.concatenate([mean[None], moved]), np.int16)
+    small, part_scale = packed(parts, np.int8)
+    out = io.BytesIO()
+    np.savez_compressed(
+        out, form=form, form_scale=scale, parts=small, part_scale=part_scale,
+        triangles=triangles.astype(np.uint16), weights=np.round(weights * 255).astype(np.uint8),
+        mirror=mirror.astype(np.uint16), names=np.array(labels), places=np.array(places, np.uint16),
+        expressions=np.array(list(EXPRESSIONS)),
+    )  # fmt: skip
+    path = PACKAGE / "form" / "heads.npz"
+    fileio.write_bytes(path, out.getvalue())
+    print(f"{path}: {path.stat().st_size} bytes, {len(mean)} vertices, {len(triangles)} triangles")
+
+
+if __name__ == "__main__":
+    main()
