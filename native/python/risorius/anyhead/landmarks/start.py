@@ -50,7 +50,11 @@ def carried(points: Doubles, one: Found, other: Found) -> Doubles:
 
 
 def common(one: Found, other: Found) -> list[str]:
-    """Names of the landmarks that both heads have, without vague ones that no person moved."""
+    """Names of the landmarks that both heads have, without vague ones that no person moved.
+
+    Args:
+        one, other: the heads.
+    """
     moved = [
         n
         for n in one.landmarks.points
