@@ -54,7 +54,7 @@ def chin() -> np.ndarray:
 @cache
 def found(seed: int) -> Found:
     """Of the head 3 an eyeball and the chin are given."""
-    given = Hints("head.obj", {"chin": chin()}, (formed(3)[head_form().skin],), Y, Z)
+    given = Hints("head.obj", {"chin": chin()}, Y, Z, (formed(3)[head_form().skin],))
     return find_form(head(seed)[0], given if seed == 3 else STANDS)
 
 
