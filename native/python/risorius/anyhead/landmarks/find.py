@@ -31,16 +31,16 @@ class Hints:
     Attributes:
         where: what errors call the head.
         marks: float64[3] by name of landmarks that a person gave.
-        eyes: middles (float64[3]) of eyeballs that are meshes of their own.
         up, front: float64[3], where the head has them; None: anywhere.
+        eyes: middles (float64[3]) of eyeballs that are meshes of their own.
         open_eyes: whether eyes without openings are refused.
     """
 
     where: str = "the head"
     marks: Mapping[str, Doubles] = field(default_factory=dict)
-    eyes: Sequence[Doubles] = ()
     up: Doubles | None = None
     front: Doubles | None = None
+    eyes: Sequence[Doubles] = ()
     open_eyes: bool = True
 
 
