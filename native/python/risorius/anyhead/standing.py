@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..author.geometry.skeleton import Doubles
+from ..author.geometry.skeleton import FARTHEST, Doubles
 from ..author.heads.directions import axis_of, check_axes, word_of
 from ..author.heads.parts import HeadPart, Wishes
 from ..author.heads.sizes import UNITS, check_unit, find_unit
@@ -21,6 +21,7 @@ from .landmarks.find import Found, Hints, find_form
 from .landmarks.marks import Landmarks
 from .surface import Surface
 
+_FLAT = 1e-3  # of the longest side
 _ASIDE = ("hair", "cloth", "lashes", "teeth", "tongue", "gum", "eyes", "wet")
 
 
@@ -63,10 +64,12 @@ def stand(
     able = [part for part in parts if part.mesh.faces]
     if not able:
         raise AnyHeadError(f"{where}: a mesh with polygons was expected, found none")
+    _check_size(where, able)
     up, front = (axis_of(word) if word else None for word in (wishes.up, wishes.front))
     given = marks.points if marks is not None else {}
-    found = find_form(_skin_of(where, able, wishes.mesh), Hints(where, given, up, front))
+    found = find_form(_skin_of(where, able, wishes.mesh), Hints(where, given, up=up, front=front))
     found.landmarks.require(where)
+    found.require_lips(where)
     turn = _turn(found.pose.rotation)
     factor, notes = _factor((TOP - CHIN) * found.pose.scale, unit, wishes)
     if not np.array_equal(turn, np.eye(3)):
@@ -101,6 +104,18 @@ def _skin_of(where: str, parts: Sequence[HeadPart], named: str) -> Surface:
         np.concatenate([s.points for s in surfaces]),
         np.concatenate([s.triangles + n for s, n in zip(surfaces, starts[:-1], strict=True)]),
     )
+
+
+def _check_size(where: str, parts: Sequence[HeadPart]) -> None:
+    points = np.concatenate([part.mesh.positions for part in parts])
+    largest = float(np.abs(points).max(initial=0.0))
+    if not largest <= FARTHEST:
+        raise AnyHeadError(
+            f"{where}: coordinates up to {FARTHEST:g} were expected, found {largest:g}"
+        )
+    extent = np.ptp(points, axis=0)
+    if not extent.min() > _FLAT * extent.max():
+        raise AnyHeadError(f"{where}: a head was expected, found vertices in one plane")
 
 
 def _turn(rotation: Doubles) -> Doubles:

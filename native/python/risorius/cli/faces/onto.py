@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from ... import Dna, load
+from ...anyhead.borrowing import lend_materials
 from ...anyhead.default import default_template
 from ...anyhead.landmarks.marks import landmarks_path, landmarks_text, read_landmarks
 from ...anyhead.onto import OntoOptions, onto, shape_face
@@ -154,6 +155,9 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     files = {}
     if args.write_landmarks is not None:
         files[args.write_landmarks] = landmarks_text(made.landmarks).encode()
+    if args.spec is not None:
+        own = {part.source for part in parts}
+        lend_materials(made.shapes.parts, template, args.spec, own)
     read = shape_face(made, template, str(args.onto))
     return replace(read, odd=made.notes + read.odd), files
 
