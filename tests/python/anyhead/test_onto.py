@@ -54,6 +54,7 @@ def test_a_head_without_expressions_becomes_a_rig(template, head, tmp_path) -> N
                "--write-landmarks", marks, "--exact", text=True)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "its top is +z" in done.stdout
+    assert "backs" not in done.stdout
     assert '"mouth_corner_L"' in marks.read_text()
     dna = load(out)
     names = [name.rpartition(".")[2] for name in dna.raw_control_names]

@@ -23,7 +23,14 @@ from ...base.reading import require_regular
 from ...files import fileio
 from ..files import CommandLineError, number
 
-_OWN = ("landmarks", "strength", "no_repair", "write_landmarks", "rig")  # options of --onto alone
+_OWN = (
+    "landmarks",
+    "strength",
+    "no_repair",
+    "write_landmarks",
+    "mesh",
+    "rig",
+)  # options of --onto alone
 
 
 class Clock(Protocol):
@@ -70,6 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         default=None,
         help="leave lids, lips and teeth as they were carried over",
+    )
+    group.add_argument(
+        "--mesh", metavar="NAME", help="the mesh that is the face, where there are several heads"
     )
     group.add_argument(
         "--rig",
@@ -147,7 +157,7 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
         1.0 if args.strength is None else args.strength,
         not args.no_repair,
         marks,
-        Wishes(height_mm=args.height_mm or 0.0, scale=args.scale or 0.0),
+        Wishes(args.mesh or "", height_mm=args.height_mm or 0.0, scale=args.scale or 0.0),
         args.threads,
     )
     made = onto(str(args.onto), parts, unit, template, options, clock, clock.line)
