@@ -17,7 +17,7 @@ from ..web.kinds import kind_of
 from .errors import AnyHeadError
 from .form.standing import CHIN, TOP
 from .landmarks.find import Found, Hints, find_form
-from .landmarks.marks import Landmarks
+from .landmarks.marks import LandmarkError, Landmarks
 from .landmarks.stand import inside_out, upright
 from .surface import Surface
 
@@ -68,11 +68,9 @@ def stand(
     up, front = (axis_of(word) if word else None for word in (wishes.up, wishes.front))
     given = marks.points if marks is not None else {}
     skin, notes = _skin_of(where, able, wishes.mesh), []
-    backwards = inside_out(skin)
+    found, backwards = _found(skin, Hints(where, given, up=up, front=front))
     if backwards:
-        skin = Surface(skin.points, skin.triangles[:, ::-1])
         notes.append("the polygons show their backs: they are turned")
-    found = find_form(skin, Hints(where, given, up=up, front=front))
     found.landmarks.require(where)
     found.require_lips(where)
     turn = upright(found.pose.rotation)
@@ -95,6 +93,17 @@ def stand(
         found.landmarks,
         [*notes, *odd, *found.landmarks.notes],
     )
+
+
+def _found(skin: Surface, hints: Hints) -> tuple[Found, bool]:
+    """The form of a head, and whether its polygons are to be turned. What hangs on it may be
+    turned where the head is not."""
+    if inside_out(skin):
+        try:
+            return find_form(Surface(skin.points, skin.triangles[:, ::-1]), hints), True
+        except LandmarkError:
+            pass
+    return find_form(skin, hints), False
 
 
 def _skin_of(where: str, parts: Sequence[HeadPart], named: str) -> Surface:
