@@ -31,6 +31,7 @@ _TOUCH = 0.8  # mm: lips that are nearer touch at rest
 _GOAL = 0.05  # mm between lips that are brought together
 _DEEP = 0.1  # mm that lips may press into each other, where they do no more at rest
 _ROUNDS = 12
+_AGAINST = 0.3  # cosine
 _NEAR = 3.0  # mm: further in there is no sign
 
 
@@ -40,7 +41,7 @@ class Meeting:
 
     Attributes:
         gap: float64[COLUMNS], in the target's unit, below 0 where they are in each other; NaN
-            where a column has no lips.
+            where no column has lips.
         way: float64[COLUMNS, 3] of length 1, from the lower to the upper lip.
     """
 
@@ -135,8 +136,12 @@ class Lips:
             order = np.argsort(-apart)  # the nearest is written last
             order = order[(column[order] >= 0) & (apart[order] < gap[column[order]])]
             gap[column[order]], way[column[order]] = apart[order], sign * toward[order]
-        known = np.isfinite(gap)
-        return Meeting(np.where(known, gap, np.nan), way)
+        known = np.flatnonzero(np.isfinite(gap))
+        if len(known):  # a column between the vertices of a coarse lip
+            every = np.arange(COLUMNS)
+            nearest = known[np.abs(every[:, None] - known).argmin(axis=1)]
+            gap, way = np.interp(every, known, gap[known]), way[nearest]
+        return Meeting(np.where(np.isfinite(gap), gap, np.nan), way)
 
     def welded(self) -> int:
         """In how many of the COLUMNS one polygon belongs to both lips."""
@@ -217,7 +222,9 @@ class Lips:
         normal = np.einsum("nk,nkd->nd", shares, normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         arm = samples - nearest
-        inside = (np.einsum("nd,nd->n", arm, normal) < 0) & (distance < _NEAR * self.mm)
+        # Beside the border of a sheet is not in it: what is in lies against the normal.
+        inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
+        inside &= distance < _NEAR * self.mm
         signed = np.where(inside, -distance, distance)
         close = distance < 1e-6 * self.mm
         way = arm / np.maximum(distance, 1e-12)[:, None] * np.where(inside, -1, 1)[:, None]

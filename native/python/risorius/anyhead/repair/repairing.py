@@ -75,8 +75,8 @@ def repair(
         Stopped: progress said False.
     """
     del registered
-    closing = _closing(expressions, combinations)
-    work = _Repair(target, faces, parts, landmarks, expressions, closing)
+    closing = closing_pose(expressions, combinations)
+    work = Repairing(target, faces, parts, landmarks, expressions, closing)
     singles: dict[str, Doubles] = {}
     jobs = len(expressions) + len(combinations) + 1
     for number, (name, way) in enumerate(expressions.items()):
@@ -95,8 +95,13 @@ def repair(
     return Repaired(singles, out, work.report)
 
 
-def _closing(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:
-    """The open jaw with closed lips; empty where the face has no such controls."""
+def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:
+    """The open jaw with closed lips; empty where the face has no such controls.
+
+    Args:
+        expressions: by raw control.
+        combinations: by the controls that are 1 together.
+    """
     names = dict.fromkeys([*expressions, *(name for pose in combinations for name in pose)])
     lips = [name for name in names if name.startswith(_CLOSE)]
     return (_OPEN, *lips) if lips and _OPEN in expressions else ()
@@ -121,7 +126,9 @@ def _closes_eye(pose: Pose, side: str) -> bool:
     return _BLINK + side in pose
 
 
-class _Repair:
+class Repairing:
+    """The lids, lips, teeth and skin of one target."""
+
     def __init__(
         self,
         target: Surface,
@@ -131,6 +138,12 @@ class _Repair:
         expressions: Mapping[str, Doubles],
         closing: Pose,
     ) -> None:
+        """Begins; see repair.
+
+        Args:
+            target, faces, parts, landmarks, expressions: as there.
+            closing: what closing_pose gives.
+        """
         self.report = Report()
         self.target = target
         self.eyelids: dict[str, Eyelids] = {}
@@ -154,7 +167,12 @@ class _Repair:
         self.contacts = Contacts(target, faces, self.bodies)
 
     def repaired(self, pose: Pose, way: Doubles) -> Doubles:
-        """float64[V, 3] of a pose; its faults go into the report."""
+        """float64[V, 3] of a pose; its faults go into the report.
+
+        Args:
+            pose: raw controls that are 1.
+            way: float64[V, 3], what they do together.
+        """
         if not way.any():
             return way
         before = self.faults(pose, way)
@@ -173,7 +191,12 @@ class _Repair:
         return out
 
     def faults(self, pose: Pose, way: Doubles) -> Faults:
-        """What is wrong with a pose."""
+        """What is wrong with a pose.
+
+        Args:
+            pose: raw controls that are 1.
+            way: float64[V, 3], what they do together.
+        """
         gap = cut = 0.0
         for side, lids in self.eyelids.items():
             turn = eye_turn_of(side, pose)
