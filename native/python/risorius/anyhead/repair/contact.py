@@ -28,7 +28,7 @@ _AROUND = 15.0  # cm: what is further hides nothing
 _WAYS = 3  # of fifteen, along which what is seen is seen
 _SHORT = 0.2  # cm: what hangs on a longer edge is not beside what is seen
 _RIM = 2  # rings of vertices beside what is seen
-_MANY = 60_000  # vertices of a skin from which on the soft way is not tried
+_LARGE = 60_000  # vertices of a skin from which on the soft way is not tried
 Mask = npt.NDArray[np.bool_]
 
 
@@ -112,7 +112,7 @@ class Contacts:
             controls: raw controls that are 1.
         """
         posed = self.bodies.posed(controls)
-        if len(self.skin.points) > _MANY:
+        if len(self.skin.points) > _LARGE:
             return self._lifted(displacement, posed)
         points = self.skin.points + displacement
         moved, _, _ = self._made().repair(points, posed, self._allowed(points), [])
