@@ -76,7 +76,9 @@ def row_of(target, fitted, singles, pairs, work, contacts, bodies, most):
     closing = set(closing_pose(singles, pairs))
     shut = [f for pose, f in faults.items() if closing and set(pose) == closing] or [Faults()]
     deep = sorted(faults, key=lambda pose: -faults[pose].volume)[:most]
-    volume = sum(contacts.counted(poses[pose], pose) for pose in deep if faults[pose].volume > 0)
+    volume = sum(
+        contacts.volume_by_checker(poses[pose], pose) for pose in deep if faults[pose].volume > 0
+    )
     seen = seen_of_eyes(target.points + blinks(singles), target.triangles, fitted.eyes)
     return (
         max(f.lid_gap for f in faults.values()), seen, max(f.cut for f in faults.values()),

@@ -92,7 +92,7 @@ class Contacts:
         beyond = np.maximum(depth - self._rest_depth - _DEEP, 0.0)
         return float(beyond @ self._share) * MM**3
 
-    def counted(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
+    def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
         """mm3 of skin in teeth and gums, beyond rest and beside what skin does to itself, by
         SkinChecker: slower than volume.
 
