@@ -176,6 +176,11 @@ class Repairing:
         if not way.any():
             return way
         before = self.faults(pose, way)
+        if self._closes_mouth(pose) and self.lips.too_far(self.target.points + way):
+            self.report.notes.append(
+                f"{'+'.join(pose)} leaves the lips {before.lip_gap:.0f} mm apart, too far to be "
+                "brought together: is the mouth open at rest?"
+            )
         out = self._at_eyes(pose, way)
         if self._closes_mouth(pose):
             out = self.lips.closed(self.target.points + out) - self.target.points
