@@ -126,6 +126,14 @@ def test_a_painted_eye_gets_no_eyeball(template):
     )
 
 
+def test_eyes_that_are_shut_get_no_eyeballs(head, template):
+    """The whole way of a blink, at rest."""
+    shut = mask(short=0.0)
+    points = shut.points + shut.ways["eyeBlinkL"] + shut.ways["eyeBlinkR"]
+    fitted = complete(sort_parts([part("skin", points, shut.faces)]), template, points)
+    assert fitted.eyes == {}
+
+
 def test_another_skin_than_the_templates_is_refused(head, template):
     found = sort_parts([part("skin", head.points, head.faces)])
     with pytest.raises(ArgumentError, match=r"of the template's skin were expected, found 3"):

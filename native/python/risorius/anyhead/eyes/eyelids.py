@@ -119,6 +119,23 @@ class Eyelids:
         own &= self._held > 0
         return self.vertices[own], self._height[own]
 
+    def apart(self, points: Doubles) -> float:
+        """How far upper and lower edge are from each other in the mean, a share of their width.
+
+        Args:
+            points: float64[V, 3], of the whole target, or of what has its vertices.
+        """
+        across = self.opening.frame.angles(self.rest)[0]
+        edge = (self._from_edge < _BAND / 3) & (self._held > 0)
+        upper, lower = np.flatnonzero(edge & self._above), np.flatnonzero(edge & ~self._above)
+        if not len(upper) or not len(lower):
+            return 0.0
+        facing = lower[np.abs(across[upper, None] - across[lower]).argmin(axis=1)]
+        off = points[self.vertices[upper]] - points[self.vertices[facing]]
+        ends = upper[[across[upper].argmin(), across[upper].argmax()]]
+        wide = np.linalg.norm(np.diff(points[self.vertices[ends]], axis=0))
+        return float(np.linalg.norm(off, axis=1).mean() / max(float(wide), 1e-12))
+
     def moves(self, displacement: Doubles) -> bool:
         """Whether an expression moves these lids.
 

@@ -176,19 +176,18 @@ class Repairing:
         if not way.any():
             return way
         before = self.faults(pose, way)
-        if self._closes_mouth(pose) and self.lips.too_far(self.target.points + way):
+        closes = self._closes_mouth(pose)
+        if closes and self.lips.too_far(self.target.points + way):
+            closes = False
             self.report.notes.append(
                 f"{'+'.join(pose)} leaves the lips {before.lip_gap:.0f} mm apart, too far to be "
                 "brought together: is the mouth open at rest?"
             )
         out = self._at_eyes(pose, way)
-        if self._closes_mouth(pose):
-            out = self.lips.closed(self.target.points + out) - self.target.points
+        out = self._lips_closed(out) if closes else out
         if before.volume > LEAST:
-            pushed = self.contacts.pushed(out, pose)
-            if self._closes_mouth(pose):
-                pushed = self.lips.closed(self.target.points + pushed) - self.target.points
-            out = pushed
+            out = self.contacts.pushed(out, pose)
+            out = self._lips_closed(out) if closes else out
         changed = out is not way and bool(np.abs(out - way).max(initial=0.0) > 0)
         after = self.faults(pose, out) if changed else before
         if before != Faults() or after != Faults() or self._closes(pose):
@@ -227,6 +226,9 @@ class Repairing:
             elif (turn is not None or lids.moves(out)) and lids.cut(out, turn) > _CUT:
                 out = lids.lifted(out, turn)
         return out
+
+    def _lips_closed(self, way: Doubles) -> Doubles:
+        return self.lips.closed(self.target.points + way) - self.target.points
 
     def _closes_mouth(self, pose: Pose) -> bool:
         return self.lips.found and bool(self.lip_controls) and set(self.lip_controls) <= set(pose)
