@@ -54,7 +54,7 @@ def lay(
     """
     if np.array_equal(face.surface.triangles, target.triangles):
         return Laid(target.points, np.ones(len(target.points)))
-    standing = Hints(face.name or "the template", {}, np.eye(3)[1], np.eye(3)[2])
+    standing = Hints(face.name or "the template", up=np.eye(3)[1], front=np.eye(3)[2])
     own = find_form(face.surface, standing)
     start = start_of(face.surface, target, own, found)
     pairs = [(v, goal.tolist()) for v, goal in pairs_of(face.surface, own, found)]
