@@ -136,12 +136,18 @@ def test_a_pose_that_closes_the_mouth_is_made_where_there_is_none(head, skin, fi
     assert out.report.rows["jawOpen+mouthClose"][1].lip_gap <= 0.3
 
 
+def test_what_works_only_together_with_others_is_an_expression_that_moves_nothing(head, mended):
+    assert list(mended.expressions) == [*head.ways, *TOGETHER]
+    assert not any(mended.expressions[name].any() for name in TOGETHER)
+
+
 def test_lips_that_are_far_apart_are_not_torn(head, skin):
     bare = sort_parts([part("face", head.points, head.faces)])
     jaw = head.ways["jawOpen"]  # and nothing closes the lips
     out = repair(skin, head.faces, bare, Corners(), None, head.ways, {CLOSED: jaw})
     assert np.array_equal(out.combinations[CLOSED], jaw)
     assert "too far to be brought together: is the mouth open at rest?" in out.report.notes[-1]
+    assert bare.notes == out.report.notes
 
 
 def test_skin_that_is_pressed_into_teeth_comes_out(head, skin, fitted):

@@ -22,6 +22,7 @@ Pose = tuple[str, ...]
 Progress = Callable[[float], bool | None]
 _BLINK, _OPEN = "eyeBlink", "jawOpen"
 _CLOSE = ("mouthLipsTogether", "mouthClose")  # what closes the mouth of an open jaw
+_ELSEWHERE = "tongue"  # what moves other meshes
 _WELDED = 2  # columns of the mouth: near its corners lips are one
 _CUT = 0.002  # cm of lids in the eye that are left alone
 
@@ -39,7 +40,8 @@ class Repaired:
     """What repair makes.
 
     Attributes:
-        expressions: float64[V, 3] by raw control.
+        expressions: float64[V, 3] by raw control; also of those that move skin together with
+            others alone, such as what closes the mouth of an open jaw.
         combinations: float64[V, 3] by the controls that are 1 together, all of the way.
         report: what was wrong, and what is left.
     """
@@ -64,7 +66,7 @@ def repair(
     Args:
         target: the skin at rest, cm, standing.
         faces: its polygons.
-        parts: eyes, teeth and the like.
+        parts: eyes, teeth and the like; its notes get those of the report.
         landmarks: corners of the mouth are used; None: they are sought.
         registered: how the template lies on the target; not needed by what is repaired here.
         expressions: float64[V, 3] by raw control.
@@ -92,6 +94,10 @@ def repair(
         out[pose] = work.repaired(pose, np.asarray(way, np.float64) + sum(changes, np.zeros(1)))
         if progress is not None and progress(number / jobs) is False:
             raise Stopped
+    for name in dict.fromkeys(name for pose in out for name in pose):
+        if name not in singles and not name.startswith(_ELSEWHERE):
+            singles[name] = np.zeros_like(target.points)
+    parts.notes.extend(work.report.notes)
     return Repaired(singles, out, work.report)
 
 
