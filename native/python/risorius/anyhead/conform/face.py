@@ -17,7 +17,8 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
 from ..errors import Stopped
-from .change import Change, similar, surface_of
+from .change import Change, Hold, similar, surface_of
+from .contacts import keep_contacts
 from .joints import Places, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
@@ -25,11 +26,12 @@ Progress = Callable[[float], object]  # told the share that is done, 0 to 1; Fal
 
 
 class Moved(NamedTuple):
-    """A mesh on both heads: float64[V, 3], float64[V, 3], float64[V, 3, 3]."""
+    """A mesh on both heads: float64[V, 3], float64[V, 3], float64[V, 3, 3]; what holds it."""
 
     before: Doubles
     after: Doubles
     linear: Doubles
+    hold: Hold | None = None
 
 
 def conform(
@@ -69,15 +71,19 @@ def conform(
     for m in range(min(len(dna.meshes), len(dna.mesh_names))):
         if len(dna.meshes[m].positions):
             meshes[m] = _moved(dna, m, change, stiff, given)
-        tell(0.2 + 0.5 * (m + 1) / len(dna.meshes))
-    places = Places(dna, {m: meshes[m] for m in finest(dna)}, change, stiff)
+        tell(0.2 + 0.3 * (m + 1) / len(dna.meshes))
+    places = Places(dna, {m: meshes[m][:3] for m in finest(dna)}, change, stiff)
     out = copy.copy(dna)
     out.meshes = [
         _mesh(mesh, meshes[m]) if m in meshes else mesh for m, mesh in enumerate(dna.meshes)
     ]
-    tell(0.9)
+    tell(0.5)
     place_joints(out, places, change.turn)
     out.joint_groups = shifts_carried(dna, places, change.turn)
+    tell(0.6)
+    rest = telling(progress, 0.6, 1.0)
+    holds = {m: own.hold for m, own in meshes.items() if own.hold is not None}
+    out = keep_contacts(dna, out, skin, change, stiff.eyes, holds, rest)
     tell(1.0)
     return out
 
@@ -155,7 +161,7 @@ def _on_skin(mesh: Mesh, points: Doubles, change: Change, eyes: Sequence[Eye]) -
     for eye in eyes:
         own = stiff_share(mesh, eye.holds)
         after[own], linear[own] = eye.way(points[own]), eye.way.linear
-    return Moved(points, after, linear)
+    return Moved(points, after, linear, hold)
 
 
 def _mesh(mesh: Mesh, moved: Moved) -> Mesh:
