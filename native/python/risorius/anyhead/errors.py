@@ -12,7 +12,7 @@ class AnyHeadError(RisoriusError):
     code = "any_head"
 
 
-class Stopped(RisoriusError):
+class Stopped(RisoriusError):  # noqa: N818  # nothing went wrong
     """Whoever was told of the progress wants no more of it."""
 
     code = "cancelled"

@@ -10,7 +10,7 @@ import numpy as np
 from ..author.geometry.skeleton import Doubles
 from .errors import Stopped
 from .landmarks.find import Found, Hints, find_form
-from .landmarks.start import start_of
+from .landmarks.start import pairs_of, start_of
 from .registration import Registered, RegisterOptions, StoppedError, register
 from .surface import Surface
 from .transfer.template import Progress, TemplateFace
@@ -57,18 +57,10 @@ def lay(
     standing = Hints(face.name or "the template", {}, np.eye(3)[1], np.eye(3)[2])
     own = find_form(face.surface, standing)
     start = start_of(face.surface, target, own, found)
-    names = [n for n in own.landmarks.points if n in found.landmarks.points]
-    pairs = [
-        (_nearest(face.surface.points, own.landmarks.points[n]), found.landmarks.points[n].tolist())
-        for n in names
-    ]
+    pairs = [(v, goal.tolist()) for v, goal in pairs_of(face.surface, own, found)]
     options = RegisterOptions(threads=threads)
     try:
         laid = register(face.surface, target, pairs, options, start, progress)
     except StoppedError:
         raise Stopped from None
     return Laid(laid.points, laid.trusted.astype(np.float64), laid)
-
-
-def _nearest(points: Doubles, place: Doubles) -> int:
-    return int(np.square(points - place).sum(axis=1).argmin())

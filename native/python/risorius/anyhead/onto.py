@@ -27,13 +27,14 @@ from ..author.input.shape_face import (
 )
 from ..author.input.spec import Read
 from ..base.words import counted
-from ..web.kinds import kind_of
 from .errors import Stopped
+from .fittings import Fittings, complete, head_parts, sort_parts
 from .landmarks.marks import Landmarks
-from .laying import Laid, lay
+from .laying import lay
+from .repair import repair
 from .standing import Standing, stand
 from .surface import Surface
-from .transfer.template import Pose, Progress, TemplateFace, read_template
+from .transfer.template import Floats, Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
@@ -68,7 +69,7 @@ class Onto:
         shapes: the head, standing; its expressions are called as the template's controls, and
             those of correctives by theirs with a + between.
         landmarks: in the space that the meshes had.
-        notes: what was guessed and done, a sentence each.
+        notes: what was guessed and done, a sentence each; those of shape_face come beside.
     """
 
     shapes: ShapeSet
@@ -108,7 +109,8 @@ def onto(
     tell("looking for the face")
     _at(progress, 0.0)
     head = stand(where, parts, unit, o.wishes, o.marks)
-    face = _face_of(head, o.wishes.mesh)
+    found = sort_parts(head.parts)
+    face = found.face
     target = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
     tell("reading the template")
     _at(progress, _FACE)
@@ -117,16 +119,39 @@ def onto(
          f"{len(target.points):,} of the head")  # fmt: skip
     laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
     tell(f"carrying {counted(len(source.ways), 'expression')} over")
-    carried = _carried(source, target, laid, o, _part(progress, _LAID, _CARRIED))
-    face.shapes = {"+".join(pose): way for pose, way in carried.items()}
-    joined = join(
-        where, head.parts, "cm", Wishes(face.source, "", "+x", "+y", "+z", "cm", 1.0),
-        {name: [name] for name in source.controls},
-    )  # fmt: skip
+    wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
+    carried = transfer(source, target, laid.points, laid.trust, wanted, rest)
+    fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
+    mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
+    every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
+    every[0].shapes |= {"+".join(p): way for p, way in mended.items() if len(p) > 1}
+    names = {name: [name] for name in source.controls}
+    joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
-    # The first sentence of these is of the direction, which is told already.
-    return Onto(shapes, head.own, [*notes, *head.notes, *joined.notes[1:]])
+    return Onto(shapes, head.own, [*notes, *head.notes, *fitted.notes, *joined.notes])
+
+
+def _mended(
+    target: Surface,
+    fitted: Fittings,
+    head: Standing,
+    ways: dict[Pose, Doubles],
+    o: OntoOptions,
+    progress: Progress | None,
+    tell: Say,
+) -> dict[Pose, Doubles]:
+    """The same poses, repaired where that is wished."""
+    if not o.repaired or not o.strength:
+        return ways
+    tell("closing lids and lips, taking skin out of eyes and teeth")
+    out = repair(
+        target, fitted.face.mesh.faces, fitted, head.found.landmarks, None,
+        {pose[0]: way for pose, way in ways.items() if len(pose) == 1},
+        {pose: way for pose, way in ways.items() if len(pose) > 1},
+        progress,
+    )  # fmt: skip
+    return {(name,): way for name, way in out.expressions.items()} | dict(out.combinations)
 
 
 def shape_face(made: Onto, template: Dna, where: str) -> Read:
@@ -157,20 +182,10 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
         dna = add_correctives(dna, 0, own)
     _copy_board(template, dna)
-    return Read(dna, Assignment({}, {}, {}, []), made.notes + odd, materials, shapes.kept)
+    return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
 
 
-def _carried(
-    source: TemplateFace, target: Surface, laid: Laid, o: OntoOptions, progress: Progress | None
-) -> dict[Pose, Doubles]:
-    """float64[V, 3] by pose, the whole way of all its controls together."""
-    found = transfer(
-        source, target, laid.points, laid.trust, TransferOptions(o.strength, o.threads), progress
-    )
-    return whole_ways(found.ways)
-
-
-def whole_ways(ways: Mapping[Pose, Doubles]) -> dict[Pose, Doubles]:
+def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
     """float64[V, 3] by pose, the whole way of all its controls, of what transfer gives.
 
     Args:
@@ -181,19 +196,6 @@ def whole_ways(ways: Mapping[Pose, Doubles]) -> dict[Pose, Doubles]:
         parts = [way for other, way in ways.items() if set(other) <= set(pose)]
         out[pose] = np.sum(parts, axis=0, dtype=np.float64)
     return out
-
-
-def _face_of(head: Standing, named: str) -> HeadPart:
-    """The mesh that the face is on: of those of skin the one nearest to its landmarks."""
-    able = [part for part in head.parts if not named or part.source == named]
-    able = [part for part in able if kind_of(part.name) == "skin"] or able
-    places = np.array(list(head.found.landmarks.points.values()))
-
-    def away(part: HeadPart) -> float:
-        points = part.mesh.positions
-        return float(np.mean([np.square(points - p).sum(axis=1).min() for p in places]))
-
-    return min(able, key=away)
 
 
 def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:

@@ -60,8 +60,10 @@ class Carrying:
         """
         face = self._face
         whole = {pose: self.carried(pose) for pose in face.ways}
-        own, other = left_over(dict(face.ways.items())), left_over(whole)
-        out = {pose: strength * way for pose, way in whole.items() if len(pose) == 1}
+        own, other = left_over(face.ways), left_over(whole)
+        out: dict[Pose, Doubles] = {
+            pose: strength * way for pose, way in whole.items() if len(pose) == 1
+        }
         for pose, way in other.items():
             there = np.linalg.norm(own[pose], axis=1, keepdims=True)
             # Two controls at a share of 1 fire their corrective by the square of it.

@@ -54,7 +54,7 @@ def _sums(before: Surface, after: Doubles) -> tuple[Doubles, Doubles]:
                 own[:, row, column] += np.bincount(at, a[:, row] * a[:, column], count)
     normals = [s.normals() for s in (before, Surface(after, before.triangles))]
     square = np.trace(own, axis1=1, axis2=2)
-    grown = np.sqrt(np.trace(mixed, axis1=1, axis2=2).clip(0) / np.maximum(square, 1e-30))
+    grown = np.trace(mixed, axis1=1, axis2=2).clip(0) / np.maximum(square, 1e-30)
     mixed += (square * grown)[:, None, None] / 2 * normals[1][:, :, None] * normals[0][:, None, :]
     own += square[:, None, None] / 2 * normals[0][:, :, None] * normals[0][:, None, :]
     return mixed, own

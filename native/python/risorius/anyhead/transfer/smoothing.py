@@ -60,6 +60,4 @@ class Smoothing:
         rows = np.concatenate([every, self._first, self._second, low[apart]])
         columns = np.concatenate([every, self._first, self._second, high[apart]])
         values = np.concatenate([held, weight * apart, weight * apart, -weight[apart]])
-        return SparseCholesky(
-            rows.astype(np.int32), columns.astype(np.int32), values, self._count
-        )
+        return SparseCholesky(rows.astype(np.int32), columns.astype(np.int32), values, self._count)

@@ -20,6 +20,9 @@ _FARTHEST = 1.5  # cm
 _NEAR = 0.3  # cm: a place so far off holds its value a third as much
 _UNSURE = 0.5  # of a sure vertex: how much one holds that registration carried along with others
 _EVENED = 0.05  # cm, over which values are evened out
+_ASIDE = 0.3  # cm, over which neighbours are asked whether a value fits theirs
+_OUTLIER = 0.4  # of a pose's longest way: a value so far from its neighbours' holds a quarter
+_ROUNDS = 3  # of asking
 _AT_REST = 1e-7  # of the area: what hangs on no known place rests
 
 
@@ -35,6 +38,7 @@ class Spreading:
         target: Surface,
         template: Surface,
         trust: Doubles,
+        parting: Doubles | None = None,
         threads: int = 0,
     ) -> None:
         """Finds the places and factorises.
@@ -43,6 +47,8 @@ class Spreading:
             target: the head, cm.
             template: the template's triangles, its points on the head.
             trust: float64[template vertices], 0 to 1: how sure the place of each is.
+            parting: float64[template vertices, n, 3], ways in which lips and lids part: vertices
+                that a slip of the registration puts across a slit are found by their neighbours.
             threads: 0: one for each core.
         """
         self._of, first = _merged(target)
@@ -58,10 +64,25 @@ class Spreading:
         sure = np.einsum("nk,nk->n", self._shares, np.maximum(trust, _UNSURE)[self._corners])
         near = np.exp(-np.square(np.where(found, distance, _FARTHEST) / _NEAR))
         self._held = np.where(found, sure * near, 0.0)
+        area, smoothing = areas(merged), Smoothing(merged)
+        if parting is not None and parting.size:
+            self._held *= self._fitting(smoothing, area, parting)
         self.known = self._held[self._of]
-        area = areas(merged)
         self._held *= area
-        self._solver = Smoothing(merged).solver(self._held + _AT_REST * area, _EVENED)
+        self._solver = smoothing.solver(self._held + _AT_REST * area, _EVENED)
+
+    def _fitting(self, smoothing: Smoothing, area: Doubles, parting: Doubles) -> Doubles:
+        """float64[n], 0 to 1: how well the value of each vertex fits those of its neighbours."""
+        longest = np.linalg.norm(parting, axis=2).max(axis=0)
+        values = self._values(parting.reshape(len(parting), -1))
+        fits = np.ones(len(values))
+        for _ in range(_ROUNDS):
+            held = self._held * fits * area
+            solver = smoothing.solver(held + _AT_REST * area, _ASIDE)
+            even = solver.solve(values * held[:, None], self._threads)
+            off = np.linalg.norm((values - even).reshape(len(values), -1, 3), axis=2) / longest
+            fits = np.square(1.0 / (1.0 + np.square(off.max(axis=1) / _OUTLIER)))
+        return fits
 
     def _values(self, values: Doubles) -> Doubles:
         """float64[n, k] at the places of the vertices, of values of the template's vertices."""

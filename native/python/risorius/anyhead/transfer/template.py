@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..._native import Dna, Probe, Rig
 from ...author.geometry import skeleton as sk
 from ...author.geometry.rigid import about
 from ...author.geometry.simplify import fan_triangles
-from ...author.geometry.skeleton import Doubles
+from ...author.geometry.skeleton import Doubles, Ints
 from ...author.heads.turning import jaw_turn
 from ...base.budget import Budget
 from ...base.errors import ArgumentError
@@ -104,14 +104,14 @@ def read_template(dna: Dna, progress: Progress | None = None) -> TemplateFace:
     if not ways:
         raise ArgumentError(f"{dna.name or 'the template'}: controls that move the skin were "
                             "expected, found none")  # fmt: skip
-    triangles = np.asarray(_triangles(dna, mesh), np.int64)
+    triangles = _triangles(dna, mesh)
     surface = Surface(points @ axes.T, triangles[:, ::-1] if np.linalg.det(axes) < 0 else triangles)
     return TemplateFace(
         dna.name, surface, mesh, names, ways, _jaw(dna, sets, names, axes, surface.points, ways)
     )
 
 
-def left_over(ways: dict[Pose, Doubles]) -> dict[Pose, Doubles]:
+def left_over(ways: Mapping[Pose, Doubles | Floats]) -> dict[Pose, Doubles]:
     """What is left of the way of each corrective's pose beside its controls alone and the smaller
     correctives among them.
 
@@ -153,7 +153,7 @@ def _probe(posed: Posed, mesh: int, count: int) -> Probe:
     return posed.probe(np.stack([np.full(count, mesh), np.arange(count)], axis=1).astype(np.int64))
 
 
-def _triangles(dna: Dna, mesh: int) -> Doubles:
+def _triangles(dna: Dna, mesh: int) -> Ints:
     source = dna.meshes[mesh]
     return source.layout_positions.astype(np.int64)[fan_triangles(source)]
 
@@ -178,7 +178,9 @@ def _jaw(
     turn = jaw_turn(points, shapes, {n: [n] for n in shapes}, shapes["jawOpen"], [])
     if turn is None:
         return None
-    turns = {(name,): motion for name, motion in turn.motions.items()}
+    turns: dict[Pose, tuple[Doubles, Doubles]] = {
+        (name,): motion for name, motion in turn.motions.items()
+    }
     for pose in ways:
         moving = [c for c in pose if (c,) in turns]
         if len(pose) > 1 and moving:

@@ -16,6 +16,8 @@ from .template import Floats, Pose, Progress, TemplateFace
 
 _AT_ONCE = 24  # poses that are solved together
 _LEAST = 1e-3  # cm: a vertex that moves less rests
+_PARTING = ("jawOpen", "eyeBlinkL", "eyeBlinkR", "mouthUpperLipRaiseL", "mouthUpperLipRaiseR",
+            "mouthLowerLipDepressL", "mouthLowerLipDepressR")  # fmt: skip
 STRENGTHS = (0.0, 1.5)
 
 
@@ -73,7 +75,7 @@ def transfer(
     ways = Carrying(face, points, trust).ways(o.strength)
     _tell(progress, 0.1)
     lying = Surface(points, face.surface.triangles)
-    spreading = Spreading(target, lying, trust, o.threads)
+    spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)
     if not (spreading.known > 0.1).any():
         raise AnyHeadError("the template lies on no part of the head: landmarks may be wrong")
     _tell(progress, 0.2)
@@ -93,3 +95,11 @@ def _tell(progress: Progress | None, share: float) -> None:
     if progress is not None and progress(share) is False:
         raise Stopped
 
+
+def _parting(face: TemplateFace, ways: dict[Pose, Doubles]) -> Doubles | None:
+    """float64[T, n, 3]: ways in which lips and lids part; the longest where no name is known."""
+    named: list[Pose] = [(name,) for name in _PARTING if (name,) in ways]
+    far = {pose: float(np.square(way).sum()) for pose, way in face.ways.items() if len(pose) == 1}
+    chosen = named or sorted(far, key=lambda pose: -far[pose])[: len(_PARTING)]
+    chosen = [pose for pose in chosen if ways[pose].any()]
+    return np.stack([ways[pose] for pose in chosen], axis=1) if chosen else None

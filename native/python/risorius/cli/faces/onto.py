@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -153,7 +154,8 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     files = {}
     if args.write_landmarks is not None:
         files[args.write_landmarks] = landmarks_text(made.landmarks).encode()
-    return shape_face(made, template, str(args.onto)), files
+    read = shape_face(made, template, str(args.onto))
+    return replace(read, odd=made.notes + read.odd), files
 
 
 def _template(path: Path | None, say: Callable[[str], None]) -> Dna:
