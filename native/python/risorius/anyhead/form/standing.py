@@ -18,6 +18,8 @@ TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
 _SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # of the surface's height that the head may have
 _PLACED, _KEPT, _TRIED = 48, 10, 3  # guesses that go on to the next stage
 _WORSE = 1.6  # a guess so much worse than the best one is none
+_OBLIQUE = 48
+SURE, NO_FACE = 0.13, 0.21  # errors up to which a head is one, and from which it is none
 _GRIDS = (400, 280, 200, 140, 100, 70, 50)  # cells along the longest side
 _CELLS = 9000
 _FAR = 1.5  # cm of the form: farther counts as this far
@@ -29,7 +31,7 @@ class Standing:
 
     Attributes:
         pose: of the form.
-        error: mean distance of the middle of the face, cm of the form; _FAR at most.
+        error: see `misfit`, and a little for parts that are seldom; cm of the form.
     """
 
     pose: Pose
@@ -77,7 +79,9 @@ def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -
 
 
 def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> float:
-    """Mean distance of the middle of the face from a surface, cm of the form.
+    """How far three quarters of the middle of the face are from a surface at most, cm of the form.
+
+    Holes, hair and inner sides take what is left of it.
 
     Args:
         target: the surface.
@@ -91,12 +95,12 @@ def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> floa
     normals, points = pose_normals(form, pose, shaped)[face], pose.place(shaped[face])
     found, near, _ = target.pairs(points, normals, 0.5, 2 * _FAR * pose.scale)
     away = np.linalg.norm(points - near, axis=1) / pose.scale
-    return float(np.where(found, np.minimum(away, _FAR), _FAR).mean())
+    return float(np.quantile(np.where(found, np.minimum(away, _FAR), _FAR), 0.75))
 
 
 def _strange(pose: Pose) -> float:
     """How unlikely the parts of a form are, cm: what a fit pays for them."""
-    return 0.004 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
+    return 0.02 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
 
 
 def find_standing(
@@ -112,9 +116,38 @@ def find_standing(
         up, front: float64[3], where it has them; None: anywhere.
         held: vertices of the form whose places are known.
     """
-    form = head_form()
     coarse = Target(coarsened(target.surface))
-    poses = [g for turn in turns(up, front) for g in guesses(coarse.surface.points, turn)]
+    best = _best(target, coarse, turns(up, front), held)
+    if best[0].error > SURE and up is None and front is None:
+        best = sorted(best + _best(target, coarse, oblique(), held), key=lambda s: s.error)
+    return best
+
+
+def oblique() -> list[Doubles]:
+    """float64[3, 3] each: turns spread evenly over all there are (Alexa 2022)."""
+    k = np.arange(_OBLIQUE) + 0.5
+    share = k / _OBLIQUE
+    a, b = 2 * np.pi * k / 2**0.5, 2 * np.pi * k / 1.533751168755204288118041
+    quarter = np.stack(
+        [
+            np.sqrt(share) * np.sin(a), np.sqrt(share) * np.cos(a),
+            np.sqrt(1 - share) * np.sin(b), np.sqrt(1 - share) * np.cos(b),
+        ],
+        axis=1,
+    )  # fmt: skip
+    out = []
+    for x, y, z, w in quarter:
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        out.append(np.eye(3) + 2 * w * cross + 2 * cross @ cross)
+    return out
+
+
+def _best(
+    target: Target, coarse: Target, ways: Sequence[Doubles], held: Held | None
+) -> list[Standing]:
+    """The best places of a head that stands in one of several ways, the best first."""
+    form = head_form()
+    poses = [g for turn in ways for g in guesses(coarse.surface.points, turn)]
     rated = _rated(coarse, [fit(coarse, pose, PLACE[:1], held) for pose in poses], form, 200)
     placed = [fit(coarse, s.pose, PLACE[1:], held) for s in rated[:_PLACED]]
     rated = _apart(_rated(coarse, placed, form, 300))[:_KEPT]

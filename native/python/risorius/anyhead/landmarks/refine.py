@@ -39,6 +39,7 @@ REGIONS = (
     Region(("nose_", "nostril_"), False, 3.5, 0.7, 0.5),
     Region(("ear_",), True, 4.5, 0.7, 0.4),
 )
+_STRAYED = 1.2  # cm of the form: a region that goes farther has found something else
 _SEEN = 0.02  # weights below count as none
 
 
@@ -70,5 +71,8 @@ def _of_region(
     steps = tuple(
         Step(6, reach, _ALL, parts, region.prior, region.least_cosine) for reach in (0.4, 0.25)
     )
+    before = pose.points(form)[places]
     points = fit(target, pose, steps, weights=weights).points(form)
+    if np.linalg.norm(points[places] - before, axis=1).max() > _STRAYED * pose.scale:
+        return {}
     return {name: points[vertex] for name, vertex in zip(names, places, strict=True)}
