@@ -15,7 +15,7 @@ import skin_oracle
 from risorius.anyhead.conform import conform, conform_face, head, is_same_topology
 from risorius.anyhead.conform.parts import Ball
 from risorius.anyhead.errors import Stopped
-from risorius.anyhead.registration import Registered
+from risorius.anyhead.laying import Laid
 from risorius.author.geometry import skeleton as sk
 from risorius.author.heads.parts import HeadPart
 from risorius.author.input.obj import ObjMesh
@@ -315,7 +315,8 @@ def as_part(dna, points, cut=False, name="sculpt"):
     faces = np.asarray(mesh.layout_positions)[np.asarray(mesh.face_layouts)].reshape(-1, 4).tolist()
     if cut:
         faces = [t for a, b, c, d in faces for t in ([b, c, d], [b, d, a])]
-    return HeadPart(name, ObjMesh(points, np.zeros((0, 2)), faces), source=name)
+    mesh = ObjMesh(points, np.zeros((0, 2)), faces, [[] for _ in faces])
+    return HeadPart(name, mesh, source=name)
 
 
 @pytest.mark.parametrize("cut", [False, True])
@@ -342,24 +343,19 @@ def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeyp
     points = stretched(skin_points(face))  # cm, standing
     lean = sk.matrices_of_vectors(np.array([0, np.pi / 2, 0]))
     given = 1.0 * points @ lean.T + [40, -3, 7]
-    marks = {f"eye_{place}_{s}": np.zeros(3) for place in ("inner", "outer") for s in "LR"}
-    found = SimpleNamespace(landmarks=SimpleNamespace(points=marks), pose=SimpleNamespace(scale=1))
     part = as_part(face, given)
     part.mesh.faces.reverse()
     part.mesh.faces[0] = [0, 30, 77]  # no polygon of the face
-    standing = SimpleNamespace(parts=[part], found=found, notes=["as it is"])
+    standing = SimpleNamespace(parts=[part], found=None, notes=["as it is"])
     monkeypatch.setattr(head, "stand", lambda *_: standing)
-    monkeypatch.setattr(head, "find_form", lambda *_: found)
-    monkeypatch.setattr(head, "start_of", lambda *_: None)
     seen = []
 
-    def register(template, target, pairs, options, start, progress):
+    def lay(template, name, target, found, threads, progress):
         seen.append((template, target))
         progress(1.0)
-        sure = np.ones(len(given), bool)
-        return Registered(given, np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros(0), sure)
+        return Laid(given, np.ones(len(given)))
 
-    monkeypatch.setattr(head, "register", register)
+    monkeypatch.setattr(head, "lay_surface", lay)
     heard = []
     made = conform_face(mirrored, [part], None, heard.append)
     template, target = seen[0]

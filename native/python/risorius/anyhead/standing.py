@@ -65,7 +65,7 @@ def stand(
         raise AnyHeadError(f"{where}: a mesh with polygons was expected, found none")
     up, front = (axis_of(word) if word else None for word in (wishes.up, wishes.front))
     given = marks.points if marks is not None else {}
-    found = find_form(_skin_of(where, able, wishes.mesh), Hints(where, given, up, front))
+    found = find_form(_skin_of(where, able, wishes.mesh), Hints(where, given, up=up, front=front))
     found.landmarks.require(where)
     turn = _turn(found.pose.rotation)
     factor, notes = _factor((TOP - CHIN) * found.pose.scale, unit, wishes)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,16 +13,12 @@ from ...author.geometry.rigid import rigid_fit
 from ...author.geometry.skeleton import Doubles
 from ...author.heads.parts import HeadPart, Wishes
 from ...author.heads.sizes import UNITS
-from ...author.heads.turning import take_eyes
 from ...author.input.obj import ObjMesh
 from ...base.words import joined
-from ...web.kinds import kind_of
-from ..errors import AnyHeadError, Stopped
-from ..form.standing import CHIN, TOP
-from ..landmarks.find import Hints, find_form
+from ..errors import AnyHeadError
+from ..fittings.sorting import sort_parts
 from ..landmarks.marks import Landmarks
-from ..landmarks.start import start_of
-from ..registration import RegisterOptions, StoppedError, register
+from ..laying import lay_surface
 from ..standing import Standing, stand
 from ..surface import Surface
 from .change import surface_of
@@ -128,7 +124,8 @@ def parts_of(dna: Dna) -> list[HeadPart]:
         corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts)]
         faces = [own.tolist() for own in np.split(corners, mesh.face_offsets[1:-1])]
         places = np.asarray(mesh.positions, np.float64) @ standing_axes(dna)
-        out.append(HeadPart(name, ObjMesh(places, np.zeros((0, 2)), faces), source=name))
+        bare = ObjMesh(places, np.zeros((0, 2)), faces, [[] for _ in faces])
+        out.append(HeadPart(name, bare, source=name))
     return out
 
 
@@ -140,59 +137,27 @@ def _laid(
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     before = np.asarray(dna.meshes[skin].positions, np.float64)
     template = _outward(surface_of(dna.meshes[skin], size * before @ axes))
-    target, balls = _face_of(standing)
-    own = find_form(template, Hints(dna.name or "the face", {}, np.eye(3)[1], np.eye(3)[2]))
-    found = standing.found
-    pairs = [
-        (int(np.square(template.points - p).sum(axis=1).argmin()), found.landmarks.points[n])
-        for n, p in own.landmarks.points.items()
-        if n in found.landmarks.points
-    ]
-    try:
-        laid = register(
-            template,
-            target,
-            [(vertex, point.tolist()) for vertex, point in pairs],
-            RegisterOptions(threads=threads),
-            start_of(template, target, own, found),
-            telling(progress, _STOOD, _LAID),
-        )
-    except StoppedError:
-        raise Stopped from None
+    parts = sort_parts(standing.parts)
+    face = parts.face.mesh
+    target = Surface.of_polygons(face.positions, face.faces)
+    laid = lay_surface(
+        template,
+        dna.name or "the face",
+        target,
+        standing.found,
+        threads,
+        telling(progress, _STOOD, _LAID),
+    )
     turn, _ = rigid_fit(template.points, laid.points)
     back = turn_back(turn)
-    sure = laid.trusted if laid.trusted.any() else np.ones(len(before), bool)
+    sure = laid.trust > 0 if (laid.trust > 0).any() else np.ones(len(before), bool)
     shift = template.points[sure].mean(axis=0) - (laid.points[sure] @ back.T).mean(axis=0)
 
     def there(places: Doubles) -> Doubles:
         return np.asarray((places @ back.T + shift) @ axes.T / size)
 
-    return there(laid.points), [Ball(there(b.middle[None])[0], b.radius / size) for b in balls]
-
-
-def _face_of(standing: Standing) -> tuple[Surface, list[Ball]]:
-    """The skin that the face of a head is on, without eyes, and the eyeballs."""
-    marks = standing.found.landmarks.points
-    middles = {side: (marks[f"eye_inner_{side}"] + marks[f"eye_outer_{side}"]) / 2 for side in "LR"}
-    shift = np.array([(middles["L"] + middles["R"])[0] / 2, 0.0, 0.0])
-    centred = [_shifted(part, -shift) for part in standing.parts]
-    height = (TOP - CHIN) * standing.found.pose.scale
-    rest, eyes = take_eyes(centred, height, {s: m - shift for s, m in middles.items()})
-    able = [part for part in rest if kind_of(part.name) == "skin" and part.mesh.faces] or rest
-    places = np.array(list(marks.values())) - shift
-
-    def away(part: HeadPart) -> float:
-        points = part.mesh.positions
-        return float(np.mean([np.square(points - p).sum(axis=1).min() for p in places]))
-
-    mesh = min(able, key=away).mesh
-    surface = Surface.of_polygons(mesh.positions + shift, mesh.faces)
-    return surface, [Ball(eye.ball.middle + shift, eye.ball.radius) for eye in eyes]
-
-
-def _shifted(part: HeadPart, shift: Doubles) -> HeadPart:
-    mesh = replace(part.mesh, positions=part.mesh.positions + shift)
-    return replace(part, mesh=mesh, shapes={})
+    balls = [Ball(there(eye.middle[None])[0], eye.radius / size) for eye in parts.eyes.values()]
+    return there(laid.points), balls
 
 
 def _outward(surface: Surface) -> Surface:
