@@ -35,9 +35,14 @@ if TYPE_CHECKING:  # names for annotations: nothing else may import the wheel
         Surface,
     )
     from risorius.anim.reactions import Reaction  # noqa: F401
+    from risorius.anyhead.conform.head import Conformed  # noqa: F401
+    from risorius.anyhead.landmarks.marks import Landmarks  # noqa: F401
+    from risorius.anyhead.onto import Onto  # noqa: F401
+    from risorius.anyhead.surface import Surface as HeadSurface  # noqa: F401
     from risorius.author import JointRig  # noqa: F401
     from risorius.author.heads.parts import HeadPart  # noqa: F401
     from risorius.author.input.shape_face import ShapeSet  # noqa: F401
+    from risorius.author.input.spec import Read  # noqa: F401
     from risorius.controls.control_names import ControlNames  # noqa: F401
     from risorius.expressions import Expression  # noqa: F401
     from risorius.importing import Report  # noqa: F401

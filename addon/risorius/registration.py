@@ -17,6 +17,7 @@ from .scene.speech import spoken_properties
 from .ui import (
     about,
     animation,
+    anyhead,
     bake,
     board,
     drag,
@@ -37,6 +38,7 @@ from .ui import (
 )
 from .ui.about import manual, preferences, timing_overlay
 from .ui.animation import operators as animation_operators
+from .ui.anyhead import operators as head_operators
 from .ui.drag import drawing as drag_drawing
 from .ui.drag import properties as drag_properties
 from .ui.drag import tool as drag_tool
@@ -68,6 +70,7 @@ CLASSES = (
     *board.CLASSES,
     *animation.CLASSES,
     *shape_keys.CLASSES,
+    *anyhead.CLASSES,
     *hand.CLASSES,
     *speech.CLASSES,
     *expressions.CLASSES,
@@ -113,7 +116,7 @@ def _window_properties() -> dict[str, object]:
         "risorius_stars": bpy.props.BoolProperty(
             name="Stars",
             translation_context=tables.CONTEXT,
-            description="Show a star beside each control: those with one are favourites",
+            description="Show a star beside each control to mark favourites",
             options={"SKIP_SAVE"},
         ),
         "risorius_show_timing": timing_overlay.show_property(),
@@ -155,6 +158,7 @@ def register() -> None:
     bpy.types.VIEW3D_MT_add.append(import_operators.draw_add)
     bpy.types.MESH_MT_shape_key_context_menu.append(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_object.append(rig_operators.draw_make_rig)
+    bpy.types.VIEW3D_MT_object.append(head_operators.draw_from_head)
     bpy.types.UI_MT_button_context_menu.append(favourites_panel.draw_button_menu)
     face_menu.register()
     framing_operators.register()
@@ -217,6 +221,7 @@ def unregister() -> None:
     framing_operators.unregister()
     face_menu.unregister()
     bpy.types.UI_MT_button_context_menu.remove(favourites_panel.draw_button_menu)
+    bpy.types.VIEW3D_MT_object.remove(head_operators.draw_from_head)
     bpy.types.VIEW3D_MT_object.remove(rig_operators.draw_make_rig)
     bpy.types.MESH_MT_shape_key_context_menu.remove(rig_operators.draw_make_rig)
     bpy.types.VIEW3D_MT_add.remove(import_operators.draw_add)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties of a .blend that hold anything at all: no traceback, and the face goes on."""
+"""Properties of a .blend with arbitrary values: no traceback, and the face keeps working."""
 
 import bpy
 import pytest
@@ -20,7 +20,7 @@ VALUES = {
     "an object": "OBJECT",
     "a text": "TEXT",
 }
-# Who bears it -> names of the property.
+# Owner -> names of its properties.
 PROPERTIES = {
     "rig": """risorius_rig risorius_controls risorius_dna risorius_lod risorius_lod_render
         risorius_lod_by_distance risorius_lod_distances risorius_follow risorius_unit
@@ -41,9 +41,11 @@ PROPERTIES = {
     "action": """risorius_baked_action risorius_digest risorius_blinks risorius_report
         risorius_expression""",
     "scene": "risorius_gaze",
-    "object": "risorius_gaze risorius_rig risorius_controls dna_mesh",
+    "object": "risorius_gaze risorius_rig risorius_controls dna_mesh risorius_landmark "
+    "risorius_landmark_found",
+    "landmark": "risorius_landmark risorius_landmark_found",
 }
-# What would hide all others: each of these has a session for itself.
+# Values that would hide all others get a session of their own.
 ALONE = (
     ("rig", "risorius_controls", "numbers"),
     ("rig", "risorius_controls", "an object"),
@@ -72,6 +74,13 @@ def rig(tmp_path):
     found = scene.load(path, "LIVE", lods=(True,) * 8)
     scene.face(found).keyframe_insert('["CTRL_expressions.jawOpen"]', frame=1)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("Other", None))
+    mesh = bpy.data.meshes.new("Head")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 0, 1)], [], [(0, 1, 2)])
+    mark = bpy.data.objects.new("chin", None)
+    mark.parent = bpy.data.objects.new("Head", mesh)
+    mark["risorius_landmark"], mark["risorius_landmark_found"] = "chin", [0.0, 0.0, 0.0]
+    for item in (mark, mark.parent):
+        bpy.context.scene.collection.objects.link(item)
     bpy.data.texts.new("Other")
     return found
 
@@ -91,6 +100,7 @@ def _owner(rig, who):
         "action": scene.controls(rig).animation_data.action,
         "scene": bpy.context.scene,
         "object": bpy.data.objects["Other"],
+        "landmark": bpy.data.objects["chin"],
     }[who]
 
 
@@ -117,6 +127,10 @@ def _use(tmp_path, number):
     for frame in (2, 3):
         context.scene.frame_set(frame)
     _panels()
+    context.view_layer.objects.active = bpy.data.objects.get("Head")
+    _panels()
+    _try(lambda _folder: risorius.place_landmark(landmark="chin"), tmp_path)
+    context.view_layer.objects.active = controls
     for step in STEPS:
         _try(step, tmp_path)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make Rig from Shape Keys: a head of any make becomes a face that does what its keys did."""
+"""Make Rig from Shape Keys: a head becomes a face that repeats its keys."""
 
 import importlib.util
 import sys
@@ -69,7 +69,7 @@ def made_face():
 
 
 def shape(item, name):
-    """Where a key alone brings the vertices, without the object's own place."""
+    """Vertices moved by one key alone, without the object's transform."""
     key = item.data.shape_keys.key_blocks[name]
     out = np.empty(3 * len(key.data), np.float32)
     key.data.foreach_get("co", out)
@@ -205,7 +205,7 @@ def test_what_cannot_be_used_leaves_nothing(head, tmp_path):
 def test_a_cancelled_rig_leaves_no_file(head, tmp_path):
     heads = scene.submodule("scene.file.shape_key_head")
     shapes = heads.shapes_of(bpy.context, head)
-    task = heads.rig_task(shapes, str(tmp_path / "a.dna"), 40, 8, 0.1)
+    task = heads.rig_task(shapes, heads.RigWishes(str(tmp_path / "a.dna"), 40, 8, 0.1))
     task.start()
     task.cancel()
     assert not task.is_running()

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 import risorius
 from support import scene
+from support.plain_head import Onto
 
 JAW = "CTRL_expressions.jawOpen"
 RANGE = f"""format = "risorius range 1"
 [controls]
 "{JAW}" = {{ neutral = 0.1, extreme = 0.9 }}
 """
+MARKS = """{"format": "risorius landmarks", "version": 1,
+"landmarks": {"chin": {"how": "found", "point": [0, -9, 8]}}}"""
 
 
 def _library(folder, name):
@@ -22,7 +25,10 @@ def _library(folder, name):
     (folder / f"{name}.toml").write_text(text, encoding="utf-8")
 
 
-OF_HEADS = ("make_rig", "load_shape_key_names", "save_shape_key_names")
+OF_HEADS = (
+    *("make_rig", "load_shape_key_names", "save_shape_key_names", "make_rig_from_head"),
+    *("conform_face", "save_landmarks", "load_landmarks"),
+)
 
 
 def _calls(folder):
@@ -33,8 +39,11 @@ def _calls(folder):
     (folder / "given.toml").write_text(RANGE, encoding="utf-8")
     (folder / "names.toml").write_text('[controls]\njawOpen = "jawOpen"', encoding="utf-8")
     _library(folder / "bad", "grin")
+    (folder / "marks.json").write_text(MARKS, encoding="utf-8")
     one = {"filepath": "//small.dna"}
     many = {"directory": "//", "files": [{"name": "small.dna"}]}
+    on_head = {"filepath": "//on_head.dna", "template": "FILE", "template_file": "//small.dna"}
+    on_head |= {"joints": 2, "levels": 1}
     csv = {"filepath": "//out.csv", "format": "CSV", "range": "CUSTOM", "start": 1, "end": 2}
     return {
         "replace_dna": [(one, "")],
@@ -49,6 +58,10 @@ def _calls(folder):
         "export_game_face": [({"filepath": "//game.glb", "lod": 0}, "game.glb")],
         "import_dna": [(one, ""), (many, "")],
         "make_rig": [({"filepath": "//rig.dna", "joints": 2, "levels": 1}, "rig.dna")],
+        "make_rig_from_head": [(on_head, "on_head.dna")],
+        "conform_face": [({"filepath": "//conformed.dna"}, "conformed.dna")],
+        "load_landmarks": [({"filepath": "//marks.json"}, "")],
+        "save_landmarks": [({"filepath": "//kept.json"}, "kept.json")],
         "learn_range": [({"filepath": "//opens.rzc"}, "")],
         "load_range": [({"filepath": "//given.toml"}, "")],
         "save_range": [({"filepath": "//saved.toml"}, "saved.toml")],
@@ -73,7 +86,7 @@ def _head():
 
 
 def _deaf(monkeypatch):
-    """The paths that are given to a recogniser, which hears nothing."""
+    """The paths given to a fake recogniser."""
     heard = []
 
     class Task:
@@ -109,6 +122,7 @@ def test_two_slashes_begin_at_the_blend_in_every_operator(dna_file, tmp_path, mo
     }
     monkeypatch.setattr(scene.submodule("scene.export.web_page"), "page", lambda *_given: b"a page")
     heard = _deaf(monkeypatch)
+    Onto(monkeypatch)
     curves = scene.submodule("scene.shape_keys.unknown_curves")
     curves.keep(scene.controls(rig), curves.Unknown("arkit", {}, ["Key 1"]))
     bpy.context.view_layer.objects.active = scene.controls(rig)
@@ -120,6 +134,8 @@ def test_two_slashes_begin_at_the_blend_in_every_operator(dna_file, tmp_path, mo
             bpy.context.view_layer.objects.active = (
                 _head() if name in OF_HEADS else scene.controls(rig)
             )
+            if name == "save_landmarks":
+                run.place_landmark(landmark="chin")
             if name == "mix_add" and len(bpy.context.window_manager.risorius_mix.parents):
                 run.mix_remove(index=0)
             assert getattr(run, name)(**given) == {"FINISHED"}, name

@@ -50,7 +50,8 @@ struct RegisterOptions {
   std::vector<std::uint8_t> trusted;
   /// [template vertices] the vertex of the other side, itself in the middle; empty: no symmetry.
   std::vector<std::uint32_t> mirrored;
-  double symmetry = 0.0;     // 1: as strong as the smoothness
+  /// How much what one side finds counts for the other; 1: as much as what that finds itself.
+  double symmetry = 0.0;
   std::size_t nodes = 2000;  // of the first, coarse steps
   double noise = 2.0;        // mm, of the points of pairs
   std::size_t threads = 0;   // 0: one for each core; the result does not depend on it

@@ -17,6 +17,7 @@ constexpr double kLeastRobust = 1.0;  // mm
 constexpr double kOutside = 2.5;      // times the median distance
 constexpr double kLeastCosine = 0.2;  // between normals of a match by features
 constexpr double kBackwards = 0.5;    // weight of the matches of the target
+constexpr double kRimReach = 25.0;    // mm to a border of the target
 constexpr std::size_t kEach = 3;      // of so many samples one looks for its vertex
 
 Feature feature(const Vec3& point, const Vec3& normal, const Bend& bend, const Counting& counting) {
@@ -42,19 +43,14 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-/// Where a vertex goes that shall reach the plane of a point, and a share of the way to the point.
-Vec3 towards(const Vec3& from, const Vec3& point, const Vec3& normal, double slide) {
-  const Vec3 way = point - from, up = normal * normal.dot(way);
-  return from + up + slide * (way - up);
-}
-
 }  // namespace
 
 Matcher::Matcher(const Target& target, const Looks& looks, std::size_t threads)
     : target_(target),
       looks_(looks),
       threads_(threads),
-      nearest_(target.form.triangles, target.form.points) {}
+      nearest_(target.form.triangles, target.form.points),
+      rims_(target.form, target.borders) {}
 
 std::vector<Match> Matcher::by_features(const Points& points, const Points& normals,
                                         const Counting& counting) const {
@@ -91,10 +87,11 @@ std::vector<Match> Matcher::by_features(const Points& points, const Points& norm
     if (samples.normals[s].dot(normals[v]) < kLeastCosine) continue;
     const double aside = (way - samples.normals[s] * samples.normals[s].dot(way)).norm();
     if (samples.border[s] != 0 && aside > samples.spacing) continue;
-    matches[v] = {towards(points[v], samples.points[s], samples.normals[s], counting.slide),
-                  looks_.belief[v] * trust(way.norm(), robust)};
+    matches[v] = {samples.points[s], samples.normals[s],
+                  looks_.belief[v] * trust(way.norm(), robust), counting.along};
   }
   if (counting.backwards) add_backwards(points, normals, counting, robust, matches);
+  rims_.match(looks_.rim, points, normals, std::min(counting.farthest, kRimReach), matches);
   return matches;
 }
 
@@ -123,7 +120,7 @@ void Matcher::add_backwards(const Points& points, const Points& normals, const C
       },
       8);
   // Sums first: a vertex may be found by many samples.
-  std::vector<Vec3> to(points.size(), Vec3::Zero());
+  Points to(points.size(), Vec3::Zero()), looking = to;
   std::vector<double> weight(points.size(), 0.0);
   for (std::size_t i = 0; i < count; ++i) {
     if (found[i] < 0) continue;
@@ -132,7 +129,8 @@ void Matcher::add_backwards(const Points& points, const Points& normals, const C
     if (looks_.belief[v] <= 0 || looks_.border[v] != 0) continue;
     if (samples.normals[s].dot(normals[v]) < kLeastCosine) continue;
     const double w = trust((samples.points[s] - points[v]).norm(), robust);
-    to[v] += w * towards(points[v], samples.points[s], normals[v], counting.slide);
+    to[v] += w * samples.points[s];
+    looking[v] += w * samples.normals[s];
     weight[v] += w;
   }
   for (std::size_t v = 0; v < points.size(); ++v) {
@@ -141,7 +139,10 @@ void Matcher::add_backwards(const Points& points, const Points& normals, const C
     const Vec3 there = to[v] / weight[v];
     const double all = matches[v].weight + w;
     matches[v].point = (matches[v].weight * matches[v].point + w * there) / all;
+    matches[v].normal = (matches[v].weight * matches[v].normal + w * looking[v].stableNormalized())
+                            .stableNormalized();
     matches[v].weight = all;
+    matches[v].along = counting.along;
   }
 }
 
@@ -184,13 +185,16 @@ std::vector<Matcher::Closest> Matcher::closest(const Points& points, const Point
 }
 
 std::vector<Match> Matcher::by_distance(const Points& points, const Points& normals,
-                                        double farthest, double least_cosine, double robust) const {
+                                        double farthest, double least_cosine, double robust,
+                                        double along) const {
   const std::vector<Closest> found = closest(points, normals, farthest, least_cosine);
   std::vector<Match> matches(points.size());
   for (std::size_t v = 0; v < points.size(); ++v) {
     if (looks_.belief[v] <= 0 || found[v].triangle < 0 || found[v].beyond_border) continue;
-    matches[v] = {found[v].point, looks_.belief[v] * trust(found[v].distance, robust)};
+    matches[v] = {found[v].point, found[v].normal,
+                  looks_.belief[v] * trust(found[v].distance, robust), along};
   }
+  rims_.match(looks_.rim, points, normals, farthest, matches);
   return matches;
 }
 

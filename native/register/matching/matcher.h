@@ -6,6 +6,7 @@
 
 #include "author/correctives/nearest.h"
 #include "register/matching/feature_tree.h"
+#include "register/matching/rims.h"
 #include "register/matching/samples.h"
 
 namespace risorius::registering::steps {
@@ -22,6 +23,7 @@ struct Looks {
   std::vector<Bend> bends;           // [V]
   std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
   std::vector<std::uint8_t> border;  // [V] not 0: on the border of the template
+  std::vector<RimEdge> rim;          // the edges of that border
 };
 
 /// How features count: millimetres that a difference of 1 is worth.
@@ -29,7 +31,7 @@ struct Counting {
   double normal = 10.0;
   double bend = 40.0;
   double farthest = 40.0;  // mm
-  double slide = 0.5;      // share of the way along the surface that a match asks for
+  double along = 0.5;      // how much a match holds along the surface, beside across it
   bool backwards = true;   // also from the target to the template
 };
 
@@ -54,7 +56,7 @@ class Matcher {
                                double least_cosine) const;
   /// [V] by closest points. In: robust  mm, a distance at which a match counts a quarter
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
-                                 double least_cosine, double robust) const;
+                                 double least_cosine, double robust, double along) const;
 
  private:
   void add_backwards(const Points& points, const Points& normals, const Counting& counting,
@@ -63,6 +65,7 @@ class Matcher {
   const Looks& looks_;
   std::size_t threads_;
   author::detail::Nearest nearest_;
+  Rims rims_;
 };
 
 }  // namespace risorius::registering::steps

@@ -22,7 +22,14 @@ struct Form {
 /// Where a vertex is to go. weight 0: nothing is known.
 struct Match {
   Vec3 point = Vec3::Zero();
-  double weight = 0.0;
+  Vec3 normal = Vec3::Zero();  // of the target there, length 1
+  double weight = 0.0;         // along the normal
+  double along = 1.0;          // weight in the plane of the target, in shares of `weight`
+
+  /// weight (n n' + along (1 - n n')) x
+  Vec3 pulled(const Vec3& x) const {
+    return weight * (along * x + (1 - along) * normal * normal.dot(x));
+  }
 };
 
 /// A pair in millimetres.

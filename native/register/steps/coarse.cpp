@@ -5,6 +5,8 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 
+#include "register/steps/conjugate.h"
+
 namespace risorius::registering::steps {
 
 namespace {
@@ -15,6 +17,15 @@ using Block = Eigen::Matrix4d;
 
 constexpr double kBound = 0.1;    // how far the affine parts of neighbours are bound to each other
 constexpr double kAtRest = 1e-4;  // holds what nothing else holds
+constexpr int kConjugate = 25;    // rounds at most
+
+/// A match that lets its vertex go along the surface.
+struct Drawn {
+  std::uint32_t node;
+  Row4 row;
+  Vec3 normal;
+  double free;  // weight that it does not have along the surface
+};
 
 }  // namespace
 
@@ -26,6 +37,7 @@ struct Coarse::Impl {
   Eigen::MatrixX3d motion;  // [4 N] of each node its position, then its affine part transposed
   std::vector<std::size_t> in_cell;
   std::vector<double> stiff;  // [edges]
+  Sparse matrix;              // lower triangle, as if every match held in all directions alike
   Eigen::SimplicialLLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>> solver;
   bool analyzed = false;
 
@@ -37,6 +49,9 @@ struct Coarse::Impl {
   /// The upper left block of every node, and what is between two.
   void add_stiffness(double stiffness, std::vector<Block>& own,
                      std::vector<Eigen::Triplet<double>>& between) const;
+  /// Holds nodes that nothing else holds where they are.
+  void hold(std::vector<Block>& own, Eigen::MatrixX3d& right) const;
+  bool factorize(const std::vector<Block>& own, std::vector<Eigen::Triplet<double>>& entries);
 };
 
 Coarse::Coarse(const Nodes& nodes, const Points& rest)
@@ -87,6 +102,33 @@ void Coarse::Impl::add_stiffness(double stiffness, std::vector<Block>& own,
   }
 }
 
+void Coarse::Impl::hold(std::vector<Block>& own, Eigen::MatrixX3d& right) const {
+  for (std::uint32_t n = 0; n < own.size(); ++n) {
+    const auto at = static_cast<Eigen::Index>(4 * n);
+    own[n].diagonal() += Row4::Constant(kAtRest);
+    right.block<4, 3>(at, 0) += kAtRest * motion.block<4, 3>(at, 0);
+  }
+}
+
+bool Coarse::Impl::factorize(const std::vector<Block>& own,
+                             std::vector<Eigen::Triplet<double>>& entries) {
+  for (std::uint32_t n = 0; n < own.size(); ++n) {
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        entries.emplace_back(static_cast<int>(4 * n) + i, static_cast<int>(4 * n) + j,
+                             own[n](i, j));
+      }
+    }
+  }
+  const auto size = static_cast<Eigen::Index>(4 * own.size());
+  matrix.resize(size, size);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  if (!analyzed) solver.analyzePattern(matrix);
+  analyzed = true;
+  solver.factorize(matrix);
+  return solver.info() == Eigen::Success;
+}
+
 bool Coarse::solve(const std::vector<Match>& matches, const std::vector<Landmark>& landmarks,
                    Pull pull) {
   Impl& my = *impl_;
@@ -96,36 +138,40 @@ bool Coarse::solve(const std::vector<Match>& matches, const std::vector<Landmark
   entries.reserve(16 * (my.nodes.edges.size() + count));
   my.add_stiffness(pull.stiffness, own, entries);
   Eigen::MatrixX3d right = Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(4 * count), 3);
-  const auto draw = [&](std::uint32_t vertex, const Vec3& to, double weight) {
+  std::vector<Drawn> drawn;
+  const auto draw = [&](std::uint32_t vertex, const Match& match, double share) {
     const std::uint32_t node = my.nodes.cell[vertex];
     const Row4 r = my.row(node, my.rest[vertex]);
-    own[node] += weight * r * r.transpose();
-    right.block<4, 3>(static_cast<Eigen::Index>(4 * node), 0) += weight * r * to.transpose();
+    own[node] += share * match.weight * r * r.transpose();
+    right.block<4, 3>(static_cast<Eigen::Index>(4 * node), 0) +=
+        share * r * match.pulled(match.point).transpose();
+    if (match.along < 1) {
+      drawn.push_back({node, r, match.normal, share * match.weight * (1 - match.along)});
+    }
   };
   for (std::uint32_t v = 0; v < matches.size(); ++v) {
     if (matches[v].weight <= 0) continue;
-    draw(v, matches[v].point,
-         matches[v].weight / static_cast<double>(my.in_cell[my.nodes.cell[v]]));
+    draw(v, matches[v], 1 / static_cast<double>(my.in_cell[my.nodes.cell[v]]));
   }
-  for (const Landmark& mark : landmarks)
-    draw(mark.vertex, mark.point, pull.landmarks * mark.weight);
-  for (std::uint32_t n = 0; n < count; ++n) {
-    const auto at = static_cast<Eigen::Index>(4 * n);
-    own[n].diagonal() += Row4::Constant(kAtRest);
-    right.block<4, 3>(at, 0) += kAtRest * my.motion.block<4, 3>(at, 0);
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        entries.emplace_back(static_cast<int>(at) + i, static_cast<int>(at) + j, own[n](i, j));
-      }
+  for (const Landmark& mark : landmarks) {
+    draw(mark.vertex, {mark.point, Vec3::Zero(), pull.landmarks * mark.weight, 1.0}, 1.0);
+  }
+  my.hold(own, right);
+  if (!my.factorize(own, entries)) return false;
+  const auto apply = [&](const Eigen::MatrixX3d& x) -> Eigen::MatrixX3d {
+    Eigen::MatrixX3d out = my.matrix.selfadjointView<Eigen::Lower>() * x;
+    for (const Drawn& one : drawn) {
+      const auto at = static_cast<Eigen::Index>(4 * one.node);
+      const Vec3 place = x.block<4, 3>(at, 0).transpose() * one.row;
+      const Vec3 flat = place - one.normal * one.normal.dot(place);
+      out.block<4, 3>(at, 0) -= one.free * one.row * flat.transpose();
     }
-  }
-  Sparse matrix(static_cast<Eigen::Index>(4 * count), static_cast<Eigen::Index>(4 * count));
-  matrix.setFromTriplets(entries.begin(), entries.end());
-  if (!my.analyzed) my.solver.analyzePattern(matrix);
-  my.analyzed = true;
-  my.solver.factorize(matrix);
-  if (my.solver.info() != Eigen::Success) return false;
-  my.motion = my.solver.solve(right);
+    return out;
+  };
+  const auto nearly = [&](const Eigen::MatrixX3d& x) -> Eigen::MatrixX3d {
+    return my.solver.solve(x);
+  };
+  conjugate(apply, nearly, right, my.motion, kConjugate);
   return my.motion.allFinite();
 }
 

@@ -4,6 +4,8 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 
+#include "register/steps/conjugate.h"
+
 namespace risorius::registering::steps {
 
 namespace {
@@ -11,6 +13,7 @@ namespace {
 using Sparse = Eigen::SparseMatrix<double>;
 
 constexpr double kStretch = 0.02;  // of the stiffness: how far motions of neighbours may differ
+constexpr int kSlides = 12;        // rounds of conjugate gradients at most
 constexpr double kHold = 1e-6;     // holds what nothing else holds
 
 /// Rows that tell how far a value differs from that of its neighbours, nearer ones first.
@@ -54,11 +57,15 @@ Sparse stretches(const Graph& graph) {
 }  // namespace
 
 struct Fine::Impl {
-  explicit Impl(const Points& from) : base(from), points(from) {}
+  explicit Impl(const Points& from)
+      : base(from),
+        points(from),
+        moved(Eigen::MatrixX3d::Zero(static_cast<Eigen::Index>(from.size()), 3)) {}
 
   const Points& base;
   Points points;
-  Sparse smooth;  // of one unit of stiffness, lower triangle
+  Eigen::MatrixX3d moved;  // from the base
+  Sparse smooth;           // of one unit of stiffness, lower triangle
   Eigen::SimplicialLLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>> solver;
   bool analyzed = false;
 };
@@ -82,16 +89,29 @@ bool Fine::solve(const std::vector<Match>& matches, double stiffness) {
     if (matches[v].weight <= 0) continue;
     const auto row = static_cast<Eigen::Index>(v);
     matrix.coeffRef(row, row) += matches[v].weight;
-    right.row(row) = matches[v].weight * (matches[v].point - my.base[v]).transpose();
+    right.row(row) = matches[v].pulled(matches[v].point - my.base[v]).transpose();
   }
   if (!my.analyzed) my.solver.analyzePattern(matrix);
   my.analyzed = true;
   my.solver.factorize(matrix);
   if (my.solver.info() != Eigen::Success) return false;
-  const Eigen::MatrixX3d moved = my.solver.solve(right);
-  if (!moved.allFinite()) return false;
+  const auto apply = [&](const Eigen::MatrixX3d& x) -> Eigen::MatrixX3d {
+    Eigen::MatrixX3d out = matrix.selfadjointView<Eigen::Lower>() * x;
+    for (std::size_t v = 0; v < matches.size(); ++v) {
+      const Match& match = matches[v];
+      if (match.weight <= 0 || match.along >= 1) continue;
+      const Vec3 way = x.row(static_cast<Eigen::Index>(v)).transpose();
+      out.row(static_cast<Eigen::Index>(v)) -= (match.weight * way - match.pulled(way)).transpose();
+    }
+    return out;
+  };
+  const auto nearly = [&](const Eigen::MatrixX3d& x) -> Eigen::MatrixX3d {
+    return my.solver.solve(x);
+  };
+  conjugate(apply, nearly, right, my.moved, kSlides);
+  if (!my.moved.allFinite()) return false;
   for (std::size_t v = 0; v < my.points.size(); ++v) {
-    my.points[v] = my.base[v] + moved.row(static_cast<Eigen::Index>(v)).transpose();
+    my.points[v] = my.base[v] + my.moved.row(static_cast<Eigen::Index>(v)).transpose();
   }
   return true;
 }

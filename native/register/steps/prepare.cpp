@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "core/parallel_for.h"
@@ -134,6 +135,22 @@ bool similarity(const std::vector<Vec3>& from, const std::vector<Vec3>& to,
 
 Vec3 vec(const Vector3& p) { return {p[0], p[1], p[2]}; }
 
+/// The triangles with one vertex alone at each position: a seam of the texture is no border.
+std::vector<Triangle> welded(const Mesh& mesh) {
+  std::vector<std::uint32_t> order(mesh.points.size()), first(mesh.points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return mesh.points[a] != mesh.points[b] ? mesh.points[a] < mesh.points[b] : a < b;
+  });
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool same = i > 0 && mesh.points[order[i]] == mesh.points[order[i - 1]];
+    first[order[i]] = same ? first[order[i - 1]] : order[i];
+  }
+  std::vector<Triangle> out = mesh.triangles;
+  for (Triangle& t : out) t = {first[t[0]], first[t[1]], first[t[2]]};
+  return out;
+}
+
 /// The share of rays into the half space before a vertex that meet nothing of its own surface.
 double openness(const author::detail::Nearest& own, const Vec3& point, const Vec3& normal) {
   if (normal.squaredNorm() < 0.5) return 1.0;
@@ -234,12 +251,13 @@ core::Result<Target> near_target(const Mesh& target, const Points& start, const 
   }
   low.array() -= kAround;
   high.array() += kAround;
-  const std::vector<std::uint8_t> borders = border_edges(target.triangles);
+  const std::vector<Triangle> corners = welded(target);
+  const std::vector<std::uint8_t> borders = border_edges(corners);
   Target out;
   std::vector<std::uint32_t> moved(target.points.size(), UINT32_MAX);
   whole.clear();
   for (std::size_t t = 0; t < target.triangles.size(); ++t) {
-    const Triangle& c = target.triangles[t];
+    const Triangle& c = corners[t];
     const std::array<Vec3, 3> p{scale.in(target.points[c[0]]), scale.in(target.points[c[1]]),
                                 scale.in(target.points[c[2]])};
     const Vec3 middle = (p[0] + p[1] + p[2]) / 3;
@@ -291,6 +309,7 @@ Looks looks_of(const Form& start, const std::vector<std::uint8_t>& trusted, doub
       if ((borders[i] >> k & 1) != 0) looks.border[t[k]] = looks.border[t[(k + 1) % 3]] = 1;
     }
   }
+  looks.rim = rim_edges(start, borders);
   const auto count = std::clamp<std::size_t>(static_cast<std::size_t>(area / (spacing * spacing)),
                                              100, 2 * kSamples);
   looks.bends = bends(start.points, start.normals, sample(start, borders, count), threads);

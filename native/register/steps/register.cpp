@@ -7,6 +7,7 @@
 
 #include "register/steps/coarse.h"
 #include "register/steps/fine.h"
+#include "register/steps/mirroring.h"
 #include "register/steps/prepare.h"
 
 namespace risorius::registering {
@@ -24,32 +25,34 @@ struct CoarseStep {
   steps::Counting counting;
 };
 constexpr std::array<CoarseStep, 8> kCoarse{{
-    {1000, 30, 3, {20, 60, 60, 0.7, false}},
-    {300, 10, 4, {20, 60, 50, 0.7, true}},
-    {100, 3, 4, {15, 60, 40, 0.7, true}},
-    {30, 1, 4, {15, 50, 30, 0.5, true}},
-    {10, 0.3, 4, {10, 40, 20, 0.5, true}},
-    {3, 0.1, 4, {10, 40, 15, 0.3, true}},
-    {1, 0.05, 4, {8, 30, 10, 0.3, true}},
-    {0.3, 0.03, 4, {8, 30, 10, 0.2, true}},
+    {300, 10, 3, {30, 150, 60, 0.7, false}},
+    {100, 5, 4, {30, 150, 50, 0.5, true}},
+    {30, 2, 4, {30, 150, 40, 0.4, true}},
+    {10, 1, 4, {30, 120, 30, 0.3, true}},
+    {3, 0.3, 4, {20, 80, 20, 0.2, true}},
+    {1, 0.1, 4, {20, 60, 15, 0.2, true}},
+    {0.3, 0.05, 4, {20, 40, 10, 0.1, true}},
+    {0.1, 0.03, 4, {20, 30, 10, 0.1, true}},
 }};
 
 /// Steps of the fine part: stiffness, how far matches may lie, at which distance they count little.
 struct FineStep {
-  double stiffness, farthest, robust;
+  double stiffness, farthest, robust, along;
   int rounds;
 };
 constexpr std::array<FineStep, 6> kFine{{
-    {100, 10, 4, 2},
-    {30, 8, 3, 2},
-    {10, 6, 2, 2},
-    {3, 5, 2, 2},
-    {0.5, 4, 2, 2},
-    {0.05, 4, 2, 3},
+    {100, 10, 4, 0.1, 2},
+    {30, 8, 3, 0.1, 2},
+    {10, 6, 2, 0.1, 2},
+    {3, 5, 2, 0.1, 2},
+    {0.5, 4, 2, 0.1, 2},
+    {0.05, 4, 2, 0.1, 3},
 }};
 
 constexpr double kLeastCosine = 0.4;  // of the normals of a match by distance
 constexpr double kFound = 0.5;        // mm from the target at which a vertex is no longer on it
+constexpr double kNoise = 2.0;        // mm, of pairs
+constexpr double kSurest = 25.0;      // times the weight, for pairs without an error
 constexpr double kPrepared = 0.15;    // of the whole work
 constexpr double kCoarsely = 0.65;
 
@@ -73,6 +76,10 @@ class Laying {
   steps::Matcher const& matcher() const { return matcher_; }
 
  private:
+  void mirror(const Points& points, bool missing, std::vector<steps::Match>& matches) const {
+    if (options_.mirrored.empty() || options_.symmetry <= 0) return;
+    steps::add_mirrored(options_.mirrored, points, options_.symmetry, missing, matches);
+  }
   bool go_on(double done) const { return !progress_ || progress_(done); }
 
   const Mesh& templ_;
@@ -95,11 +102,13 @@ core::Result<Points> Laying::coarse(const Points& start) const {
   double done = 0;
   for (const CoarseStep& step : kCoarse) {
     for (int round = 0; round < step.rounds; ++round) {
-      if (!go_on(kPrepared + (kCoarsely - kPrepared) * done / kCoarse.size())) {
+      if (!go_on(kPrepared +
+                 (kCoarsely - kPrepared) * done / static_cast<double>(kCoarse.size()))) {
         return stopped();
       }
       const Points normals = steps::vertex_normals(now, templ_.triangles);
-      const auto matches = matcher_.by_features(now, normals, step.counting);
+      auto matches = matcher_.by_features(now, normals, step.counting);
+      mirror(now, false, matches);
       if (!coarse.solve(matches, landmarks_, {step.stiffness, step.landmarks})) {
         return unsolvable();
       }
@@ -115,12 +124,12 @@ core::Result<Points> Laying::fine(const Points& base) const {
   double done = 0;
   for (const FineStep& step : kFine) {
     for (int round = 0; round < step.rounds; ++round) {
-      if (!go_on(kCoarsely + (1 - kCoarsely) * done / kFine.size())) {
+      if (!go_on(kCoarsely + (1 - kCoarsely) * done / static_cast<double>(kFine.size()))) {
         return stopped();
       }
       const Points normals = steps::vertex_normals(fine.points(), templ_.triangles);
-      const auto matches =
-          matcher_.by_distance(fine.points(), normals, step.farthest, kLeastCosine, step.robust);
+      const auto matches = matcher_.by_distance(fine.points(), normals, step.farthest, kLeastCosine,
+                                                step.robust, step.along);
       if (!fine.solve(matches, step.stiffness)) return unsolvable();
       done += 1.0 / step.rounds;
     }
@@ -128,11 +137,13 @@ core::Result<Points> Laying::fine(const Points& base) const {
   return fine.points();
 }
 
-std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs,
-                                          const steps::Scale& scale) {
+std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs, const steps::Scale& scale,
+                                          double noise) {
+  // Errors of pairs count by their variance; the steps are made for those of kNoise.
+  const double sure = kNoise * kNoise / std::max(noise * noise, kNoise * kNoise / kSurest);
   std::vector<steps::Landmark> out;
   for (const Pair& pair : pairs) {
-    if (pair.weight > 0) out.push_back({pair.vertex, scale.in(pair.point), pair.weight});
+    if (pair.weight > 0) out.push_back({pair.vertex, scale.in(pair.point), sure * pair.weight});
   }
   return out;
 }
@@ -185,7 +196,8 @@ core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
   if (progress && !progress(kPrepared / 2)) return stopped();
   const steps::Looks looks =
       steps::looks_of(form, options.trusted, near.value().samples.spacing, options.threads);
-  const Laying laying(templ, near.value(), looks, landmarks_of(pairs, scale), options, progress);
+  const Laying laying(templ, near.value(), looks, landmarks_of(pairs, scale, options.noise),
+                      options, progress);
   auto coarse = laying.coarse(form.points);
   if (!coarse) return std::move(coarse).propagate();
   auto fine = laying.fine(coarse.value());

@@ -57,7 +57,7 @@ def ball(middle, joint, radius=1.3, rings=8, around=12):
 
 
 def with_lid(mesh):
-    """A skin whose left lid hangs on a joint at the eye's middle, as lids do that slide on eyes."""
+    """A skin whose left lid has a joint at the centre of the eye, so that it slides on the eye."""
     lid = (np.abs(mesh.positions[:, :2] - 3.0) < 1.7).all(axis=1)
     joints = np.array(mesh.skin_joint_indices).reshape(-1, 4)
     weights = np.array(mesh.skin_weights).reshape(-1, 4)
@@ -300,7 +300,7 @@ def test_axes_and_units_of_the_file_do_not_matter(face):
     for a, b in zip(found.meshes, wanted.meshes, strict=True):
         assert np.abs(a.positions - b.positions).max() < 1e-5
         assert np.abs(a.normals - b.normals).max() < 0.05  # polygons are cut another way
-    # Cells of vertices that are seen as one lie along the axes: a root far below feels it most.
+    # Vertices are grouped in cells along the axes, which affects a root far below most.
     off = np.abs(found.neutral_joint_translations - wanted.neutral_joint_translations)
     assert off.max() < 3e-3
     assert np.median(off) < 1e-4
@@ -337,7 +337,7 @@ def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
 
 
 def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
-    """The steps before are known by other tests: here they give what they shall."""
+    """Other tests cover the earlier steps, so these are replaced by exact results here."""
     system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
     mirrored = face.convert(**system, face_winding_order="ccw")
     points = stretched(skin_points(face))  # cm, standing

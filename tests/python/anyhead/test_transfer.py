@@ -40,7 +40,7 @@ def template():
 
 
 def on(template, points, target=None, **options):
-    """What transfer gives on a head that the template's vertices lie on at these points."""
+    """The transfer to a head with the template's vertices at given points."""
     target = target or Surface(points, template.surface.triangles)
     return transfer(
         template, target, points, np.ones(len(points)), TransferOptions(threads=1, **options)
@@ -136,8 +136,8 @@ def test_a_hole_of_the_template_is_filled_from_around_it(template) -> None:
 
 
 def slit():
-    """Two plates, edge against edge with a hair between, the lower of which goes down, and the
-    numbers of the upper one's vertices."""
+    """Two plates, edge to edge with a tiny gap; the lower one moves down. Also the vertex indices
+    of the upper one."""
     x, y = np.meshgrid(np.linspace(-2, 2, 21), np.linspace(0.01, 4, 21))
     up = np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)
     corner = np.arange(21 * 21).reshape(21, 21)

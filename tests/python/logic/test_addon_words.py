@@ -40,7 +40,7 @@ def read(name: str) -> dict[str, Any]:
 
 
 class Reader(ast.NodeVisitor):
-    """Collects the words of one file, and what hides them from translation."""
+    """Collects the strings of a file, and code that hides them from translation."""
 
     def __init__(self, path: Path, only: Sequence[str] = ()) -> None:
         self.path, self.only = path, only
@@ -53,7 +53,7 @@ class Reader(ast.NodeVisitor):
         self.visit(self.tree)
 
     def note(self, node: ast.AST) -> None:
-        """What names are given: by assignments, and by loops over rows that are written out."""
+        """Record values of names from assignments and from loops over literal rows."""
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 if isinstance(target, ast.Name):
@@ -150,7 +150,7 @@ def sources() -> Iterator[Path]:
 
 
 def sources_of_sentences() -> Iterator[Path]:
-    """Files that show nothing themselves and make sentences for those that do."""
+    """Files that make sentences for other files to show."""
     yield ADDON / "native.py"
     for folder in ("scene", "logic"):
         for path in sorted((ADDON / folder).rglob("*.py")):
@@ -170,6 +170,11 @@ def titles_of_the_package() -> Found:
         for row in table.get("expressions", table).values():
             if isinstance(row, dict) and "label" in row:
                 found["Risorius", row["label"]] = path.name
+    path = PACKAGE / "anyhead" / "landmarks" / "names.toml"
+    for name, row in tomllib.loads(path.read_text(encoding="utf-8")).items():
+        found["Risorius", row["words"]] = path.name
+        if name.endswith("_L"):
+            found["Risorius", row["words"].replace(" left ", " right ")] = path.name
     table = tomllib.loads((PACKAGE / "live" / "sources.toml").read_text(encoding="utf-8"))
     found |= {("*", row["description"]): "sources.toml" for row in table.values()}
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import cast
+from typing import NamedTuple, cast
 
 import bpy
 import numpy as np
@@ -46,7 +46,7 @@ def taken_with(context: Context, head: MeshObject) -> list[MeshObject]:
         context: has the selection.
         head: of head_of.
     """
-    others = [item for item in context.selected_objects if item != head and _is_plain(item)]
+    others = [item for item in context.selected_objects if item != head and is_plain(item)]
     return [head, *(cast(MeshObject, item) for item in others)]
 
 
@@ -61,13 +61,13 @@ def relatives_of(context: Context, taken: Sequence[MeshObject]) -> list[MeshObje
     return [
         cast(MeshObject, item)
         for item in context.visible_objects
-        if item not in taken and _is_plain(item) and not above.isdisjoint(_owners(item))
+        if item not in taken and is_plain(item) and not above.isdisjoint(_owners(item))
     ]
 
 
-def _is_plain(item: bpy.types.Object) -> bool:
+def is_plain(item: bpy.types.Object | None) -> bool:
     """Whether an object is a mesh with faces, and no part of a face that was imported."""
-    if item.type != "MESH" or parts.rig_of(item) is not None:
+    if item is None or item.type != "MESH" or parts.rig_of(item) is not None:
         return False
     return bool(cast(MeshObject, item).data.polygons)
 
@@ -105,7 +105,7 @@ def shapes_of(
     if not item.data.polygons:
         raise HeadError(told("{name} has no faces.", name=item.name))
     heads, face = native.part("author.heads.parts"), native.part("author.input.shape_face")
-    rows = [_part_of(context, one, item) for one in (item, *others)]
+    rows = [part_of(context, one, item) for one in (item, *others)]
     # An object has the size that it has: a face that is made smaller would not fit its body.
     size = {"height_mm": height_mm} if height_mm else {"scale": 1.0}
     wishes = heads.Wishes(rather=item.name, **size)
@@ -114,15 +114,40 @@ def shapes_of(
     return face.shape_set(item.name, joined)
 
 
-def _part_of(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
-    """A mesh and its shape keys, seen from where the head is."""
-    author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
-    # Blender's x, z and -y are the file's x, y and z.
+def turn_of(context: Context, item: bpy.types.Object) -> Doubles:
+    """float64[3, 3] from an object's own coordinates to centimetres with y up, x left, z the front.
+
+    Args:
+        context: the scene says what a unit is.
+        item: its rotation and size count.
+    """
+    return np.asarray(_axes(context) @ np.array(item.matrix_world.to_3x3(), np.float64))
+
+
+def _axes(context: Context) -> Doubles:
+    """From Blender's x, y and z to the file's: Blender's x, z and -y, in centimetres."""
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    axes *= 100.0 * context.scene.unit_settings.scale_length
-    turn = axes @ np.array(item.matrix_world.to_3x3(), np.float64)
+    return axes * 100.0 * context.scene.unit_settings.scale_length
+
+
+def part_of(
+    context: Context, item: MeshObject, head: MeshObject, *, with_keys: bool = True
+) -> native.HeadPart:
+    """A mesh and its shape keys, in turn_of's space, seen from where the head is.
+
+    Args:
+        context: the scene says what a unit is.
+        item: the mesh.
+        head: the mesh that is the face.
+        with_keys: False: the mesh as its first key has it, without shapes.
+
+    Raises:
+        HeadError: the keys are not relative.
+    """
+    author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
+    turn = turn_of(context, item)
     apart = item.matrix_world.translation - head.matrix_world.translation
-    shift = axes @ np.array(apart, np.float64)
+    shift = _axes(context) @ np.array(apart, np.float64)
 
     def points(key: bpy.types.ShapeKey | None) -> Doubles:
         out = np.empty(3 * len(item.data.vertices), np.float32)
@@ -130,9 +155,9 @@ def _part_of(context: Context, item: MeshObject, head: MeshObject) -> native.Hea
         return out.reshape(-1, 3).astype(np.float64) @ turn.T
 
     keys = item.data.shape_keys
-    if keys is None:
-        mesh = author.ObjMesh(points(None) + shift, *_polygons(item))
-        return heads.HeadPart(item.name, mesh, {}, source=item.name)
+    if keys is None or not with_keys:
+        rest = points(keys.reference_key if keys is not None else None) + shift
+        return heads.HeadPart(item.name, author.ObjMesh(rest, *_polygons(item)), source=item.name)
     if not keys.use_relative:
         raise HeadError(told("The shape keys are not relative: turn on Relative in their panel."))
     cached = {key.name: points(key) for key in keys.key_blocks}
@@ -163,58 +188,105 @@ def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int
     return unique.astype(np.float64), faces, places
 
 
-def rig_task(
-    shapes: native.ShapeSet,
-    path: str,
-    joints: int,
-    levels: int,
-    tolerance_mm: float | None = None,
-    *,
-    keep: bool = True,
-    said: Mapping[str, str | list[str]] | None = None,
-) -> Task[tuple[native.JointRig, list[str]]]:
-    """The making of a joint rig, which ends with the file; a cancelled one leaves none.
+class Rigged(NamedTuple):
+    """What became of a head.
 
-    Args:
-        shapes: as shapes_of gives them.
+    Attributes:
+        rig: risorius.author.JointRig.
+        odd: a sentence each on what is odd about the head.
+    """
+
+    rig: native.JointRig
+    odd: list[str]
+
+
+class RigWishes(NamedTuple):
+    """What a joint rig is to be.
+
+    Attributes:
         path: of the DNA file.
         joints: new ones.
         levels: of detail.
         tolerance_mm: blend shapes keep what joints leave beyond it; None: a share of the height.
         keep: whether there are blend shapes; False: joints alone.
-        said: what the user said that keys are, as risorius.author.input.said.
-
-    Returns:
-        A task whose result is risorius.author.JointRig and what is odd, a sentence each.
     """
-    author = native.part("author")
-    face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
-    library = native.part("author.input.library")
 
-    def work(
-        progress: Callable[[float], None], cancelled: Callable[[], bool]
-    ) -> tuple[native.JointRig, list[str]]:
-        odd = face.check_shapes(shapes)
-        became = matching.assign(shapes.expressions, said or {})
-        odd += became.notes
-        dna = face.make_shape_face(shapes, became.controls)
-        options = author.RigOptions(
-            author.FitOptions(joints=joints),
-            tolerance_mm,
-            shapes=keep,
-            lods=author.LodOptions(count=levels),
-            kept=shapes.kept,
-        )
-        rig = author.make_joint_rig(dna, options, telling(progress, cancelled))
-        if not cancelled():
-            rig.dna.save(path)
-            if became.expressions:
-                folder = library.library_folder(Path(path))
-                native.part("files.fileio").write_all(library.library_files(became, folder))
-                odd.extend(library.about_library(became, folder))
-        return rig, odd
+    path: str
+    joints: int
+    levels: int
+    tolerance_mm: float | None = None
+    keep: bool = True
+
+
+def rig_task(
+    shapes: native.ShapeSet,
+    wishes: RigWishes,
+    said: Mapping[str, str | list[str]] | None = None,
+) -> Task[Rigged]:
+    """The making of a joint rig, which ends with the file; a cancelled one leaves none.
+
+    Args:
+        shapes: as shapes_of gives them.
+        wishes: what it is to be.
+        said: what the user said that keys are, as risorius.author.input.said.
+    """
+
+    def work(progress: Callable[[float], None], cancelled: Callable[[], bool]) -> Rigged:
+        return make_rig(shapes, wishes, said, progress, cancelled)
 
     return Task(work)
+
+
+def make_rig(
+    shapes: native.ShapeSet,
+    wishes: RigWishes,
+    said: Mapping[str, str | list[str]] | None,
+    progress: Callable[[float], None],
+    cancelled: Callable[[], bool],
+) -> Rigged:
+    """Make a joint rig and write it. It uses nothing of Blender's.
+
+    Args:
+        shapes, wishes, said: as for rig_task.
+        progress, cancelled: of a task's work; a cancelled one writes no file.
+    """
+    face, matching = native.part("author.input.shape_face"), native.part("author.input.matching")
+    library = native.part("author.input.library")
+    odd = face.check_shapes(shapes)
+    became = matching.assign(shapes.expressions, said or {})
+    odd += became.notes
+    dna = face.make_shape_face(shapes, became.controls)
+    rig = joint_rig(dna, wishes, shapes.kept, telling(progress, cancelled))
+    if not cancelled():
+        rig.dna.save(wishes.path)
+        if became.expressions:
+            folder = library.library_folder(Path(wishes.path))
+            native.part("files.fileio").write_all(library.library_files(became, folder))
+            odd.extend(library.about_library(became, folder))
+    return Rigged(rig, odd)
+
+
+def joint_rig(
+    dna: native.Dna, wishes: RigWishes, kept: Sequence[str], progress: Callable[[float], bool]
+) -> native.JointRig:
+    """Joints for a face of blend shapes.
+
+    Args:
+        dna: the face.
+        wishes: what the rig is to be.
+        kept: beginnings of the names of meshes that stay as they hang.
+        progress: takes the share that is done; False ends the work.
+    """
+    author = native.part("author")
+    options = author.RigOptions(
+        author.FitOptions(joints=wishes.joints),
+        wishes.tolerance_mm,
+        shapes=wishes.keep,
+        lods=author.LodOptions(count=wishes.levels),
+        kept=tuple(kept),
+    )
+    rig: native.JointRig = author.make_joint_rig(dna, options, progress)
+    return rig
 
 
 def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> None:

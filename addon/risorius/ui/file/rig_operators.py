@@ -4,7 +4,7 @@
 """A head with shape keys becomes a face: joints that do what its shapes did."""
 
 from collections.abc import Sequence
-from typing import cast
+from typing import NamedTuple, cast
 
 import bpy
 
@@ -34,24 +34,29 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     joints: bpy.props.IntProperty(
-        name="Joints", description="How many are made", default=120, min=2, max=1000
+        name="Joints", description="Number of joints", default=120, min=2, max=1000
     )
     levels: bpy.props.IntProperty(
         name="Levels of Detail",
-        description="Each with fewer joints and vertices than the one before",
+        description=(
+            "Number of levels of detail; each has fewer joints and vertices than the one before"
+        ),
         default=8,
         min=1,
         max=32,
     )
     use_shapes: bpy.props.BoolProperty(
         name="Keep Shapes",
-        description="What the joints leave of a shape stays as a blend shape",
+        description="Keep the errors of the joints as blend shapes",
         default=True,
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Millimetres that joints may be off before a blend shape helps; 0: a share of "
-        "the head's height. Where more shapes would be kept than the head has, it is raised",
+        description=(
+            "Largest error of the joints in millimetres without a blend "
+            "shape; 0: a share of the head's height. It is raised if the rig "
+            "would become heavier than the head"
+        ),
         default=0.0,
         min=0.0,
         max=10.0,
@@ -64,7 +69,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     )
     height: bpy.props.FloatProperty(
         name="Height",
-        description="Of the face from the chin to the top, in millimetres. 0: as it is",
+        description="Height of the face from the chin to the top in millimetres. 0: as it is",
         default=0.0,
         min=0.0,
         max=100_000.0,
@@ -99,15 +104,10 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
             self.report({"ERROR"}, words.of_error(error))
             return {"CANCELLED"}
         self._head, self._shapes = item.name, shapes
-        task = shape_key_head.rig_task(
-            shapes,
-            self.filepath,
-            self.joints,
-            self.levels,
-            self.tolerance or None,
-            keep=self.use_shapes,
-            said=said,
+        wishes = shape_key_head.RigWishes(
+            self.filepath, self.joints, self.levels, self.tolerance or None, self.use_shapes
         )
+        task = shape_key_head.rig_task(shapes, wishes, said)
         self._task = task
         return self.begin(context, task)
 
@@ -126,41 +126,8 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
         except native.user_errors() as error:
             self.report({"ERROR"}, explain(self.filepath, error))
             return {"CANCELLED"}
-        rig, odd = task.result
-        before = set(bpy.data.objects)
-        options = build.BuildOptions(materials=False)
-        if import_character(self, context, self.filepath, options) != {"FINISHED"}:
-            return {"CANCELLED"}
-        self._take_place(context, before)
-        for sentence in self._shapes.notes:
-            self.report({"INFO"}, sentence)
-        for sentence in odd[:5]:
-            self.report({"WARNING"}, sentence)
-        largest = rig.levels[0].largest_with_shapes
-        self.report(
-            {"INFO"},
-            words.say(
-                "{count} joints; deltas {before} -> {after}; no vertex further off than {mm} mm",
-                count=len(rig.new_joints),
-                before=rig.deltas_before,
-                after=rig.deltas_after,
-                mm=f"{largest:.2f}",
-            ),
-        )
-        return {"FINISHED"}
-
-    def _take_place(self, context: Context, before: set[bpy.types.Object]) -> None:
-        """Beside the head, and with its materials."""
-        head = bpy.data.objects.get(self._head)
-        made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
-        if head is None or made is None:
-            return
-        shape_key_head.take_materials(parts.meshes_of(made), self._shapes)
-        rig_placement.put_beside_mesh(made, head)
-        rig_placement.put_beside(context.scene, made)
-        evaluate.bring_up(context, made)
-        if not bpy.app.background:
-            framing.frame(context, made)
+        made = MadeFace(self._head, self._shapes, *task.result)
+        return show_made(self, context, self.filepath, made)
 
     def draw(self, context: Context) -> None:
         layout = self.layout
@@ -193,6 +160,82 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
 
 def _named(items: Sequence[MeshObject]) -> list[str]:
     return [item.name for item in items]
+
+
+class MadeFace(NamedTuple):
+    """A face that was made of a head, and written.
+
+    Attributes:
+        head: name of the mesh object.
+        shapes: what the face was made from.
+        rig: risorius.author.JointRig.
+        odd: sentences.
+    """
+
+    head: str
+    shapes: "native.ShapeSet"
+    rig: "native.JointRig"
+    odd: Sequence[str]
+
+
+def show_made(
+    operator: Operator,
+    context: Context,
+    path: str,
+    made: MadeFace,
+    *,
+    with_materials: bool = False,
+) -> Result:
+    """Import a face beside the head that it was made of, which lends its materials; report on it.
+
+    Args:
+        operator: reports through it.
+        context: Blender context.
+        path: of the DNA file.
+        made: what was made.
+        with_materials: build materials for meshes that no object lends one.
+
+    Returns:
+        What `execute` returns.
+    """
+    before, materials = set(bpy.data.objects), set(bpy.data.materials)
+    options = build.BuildOptions(materials=with_materials)
+    if import_character(operator, context, path, options) != {"FINISHED"}:
+        return {"CANCELLED"}
+    _take_place(context, made, before)
+    for material in set(bpy.data.materials) - materials:
+        if not material.users:  # the head lent its own
+            bpy.data.materials.remove(material)
+    for sentence in made.shapes.notes:
+        operator.report({"INFO"}, sentence)
+    for sentence in made.odd[:5]:
+        operator.report({"WARNING"}, sentence)
+    rig = made.rig
+    operator.report(
+        {"INFO"},
+        words.say(
+            "{count} joints; deltas {before} -> {after}; no vertex further off than {mm} mm",
+            count=len(rig.new_joints),
+            before=rig.deltas_before,
+            after=rig.deltas_after,
+            mm=f"{rig.levels[0].largest_with_shapes:.2f}",
+        ),
+    )
+    return {"FINISHED"}
+
+
+def _take_place(context: Context, face: MadeFace, before: set[bpy.types.Object]) -> None:
+    """Beside the head, and with its materials."""
+    head = bpy.data.objects.get(face.head)
+    made = next((o for o in set(bpy.data.objects) - before if parts.is_rig(o)), None)
+    if head is None or made is None:
+        return
+    shape_key_head.take_materials(parts.meshes_of(made), face.shapes)
+    rig_placement.put_beside_mesh(made, head)
+    rig_placement.put_beside(context.scene, made)
+    evaluate.bring_up(context, made)
+    if not bpy.app.background:
+        framing.frame(context, made)
 
 
 def draw_make_rig(self: Menu, _context: Context) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The submenus of the menu Face. An entry that cannot be used is grey, and its tooltip says why."""
+"""The submenus of the menu Face. An unavailable entry is grey, and its tooltip gives the reason."""
 
 from ... import native
 from ...scene.character import board, runtime
@@ -183,6 +183,9 @@ class RISORIUS_MT_face_character(Menu):
         layout.menu("RISORIUS_MT_sample", text="Add a Face", text_ctxt=words.CONTEXT, icon="USER")
         layout.operator("risorius.import_dna", icon="IMPORT")
         layout.operator("risorius.make_rig", icon="SHAPEKEY_DATA")
+        layout.operator("risorius.make_rig_from_head")
+        layout.operator("risorius.conform_face")
+        layout.operator("risorius.find_landmarks")
         layout.separator()
         layout.operator("risorius.attach_body", icon="ARMATURE_DATA")
         layout.operator("risorius.detach_body")

@@ -41,7 +41,7 @@ class RegisterOptions:
     mirrored: Ints | None = None
     """int[V], the vertex of the other side, itself in the middle. None: no symmetry."""
     symmetry: float = 0.0
-    """How far both sides move alike; 1 is as strong as the smoothness."""
+    """How much what one side finds counts for the other; 1: as much as what that finds itself."""
     nodes: int = 2000
     """Of the coarse steps."""
     noise: float = 2.0

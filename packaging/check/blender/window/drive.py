@@ -38,6 +38,7 @@ from common import (
 from file_tasks import face_menu, own_head, studio, two_faces
 from german import german
 from hand import HEIGHT, WIDTH, Hand, LateError, difference
+from head_tasks import plain_head
 from keyed import keyed
 from menus import name_file
 from posing_tasks import gaze, smirk, two_seconds
@@ -243,6 +244,7 @@ STEPS: tuple[Step, ...] = (
     face_menu,
     two_faces,
     own_head,
+    plain_head,
     studio,
     shot,
     german,

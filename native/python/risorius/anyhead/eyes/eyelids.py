@@ -23,10 +23,13 @@ _CORNER = 4.0  # mm beyond a corner: what goes none of it
 _CLEAR = 0.3  # mm above the eye at rest: what is outside of it, no rim that touches
 _SKIN = 0.5  # mm above the eye, least of what was further from it
 _PRESSED = 0.1  # mm that edges overlap which are brought together
+_OVER = 0.4  # mm that an edge goes further than its own column asks for
 _BESIDE = 0.5  # mm beyond the edges, where the eye is seen between lids still
 _THROUGH = 0.8  # mm that the edges of closed lids may overlap
 _LOWER = 0.15  # of the gap: what the lower lid takes
-_ROUNDS = 6
+_ROUNDS = 8
+_ENOUGH = 0.1  # mm of an eye that is seen between closed lids
+_SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # shares of columns
 _HELD = 1.5  # of the radius: what is further from the eye's middle goes less far
 _LOOKS = 64  # directions each way that are looked along
 _LIFTS = 4
@@ -171,6 +174,8 @@ class Eyelids:
             wrong = self._gap(points, turn)
             if wrong < least:
                 best, least = points, wrong
+            if number and wrong < _ENOUGH * self.mm:
+                break
         out = displacement.copy()
         out[self.vertices] = best - self.rest
         return out
@@ -203,19 +208,18 @@ class Eyelids:
         low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
         unit = self.mm / self.ball.radius
         apart = high - low
-        seen = self._seen(points, turn)
-        seen = np.where(seen > 0, seen / self.ball.radius, np.nan)
-        # What is hidden in the eye overlaps a little where it is seen; a hole does more.
-        apart = np.fmax(apart, np.fmin(seen, apart + _THROUGH * unit))
         known = ~np.isnan(apart)
         if not known.any():
             return np.zeros(len(apart))
         columns = np.arange(len(apart))
         apart = np.interp(columns, columns[known], apart[known])
-        lacks = np.where(apart > 0, apart + _PRESSED * unit, 0.0)
+        # What is hidden in the eye overlaps a little where the eye is seen.
+        seen = self._seen(points, turn) / self.ball.radius
+        lacks = np.where(seen > 0, np.maximum(apart, seen) + _PRESSED * unit, 0.0)
         through = np.minimum(apart + _THROUGH * unit, 0.0)
         most = self.opening.high - self.opening.low  # a corner is no place to go far
-        return np.clip(_even(lacks + through), -most, most)
+        even = np.minimum(_even(lacks), np.maximum(apart, 0.0) + _OVER * unit)
+        return np.clip(even + _even(through), -most, most)
 
     def _fade(self, most: float) -> Doubles:
         """float64[n]: how much of a turn each vertex takes; most: radians an edge is turned by."""
@@ -316,9 +320,9 @@ class Eyelids:
 
 
 def _even(values: Doubles) -> Doubles:
-    """Columns as their neighbours have them."""
-    wide = np.pad(values, 2, mode="edge")
-    return np.asarray((wide[:-4] + 2 * wide[1:-3] + 3 * wide[2:-2] + 2 * wide[3:-1] + wide[4:]) / 9)
+    """Columns as their neighbours have them: edges of coarse lids have no notches."""
+    wide = np.pad(values, len(_SOFT) // 2, mode="edge")
+    return np.convolve(wide, _SOFT / _SOFT.sum(), mode="valid")
 
 
 def find_eyelids(skin: Surface, ball: Eyeball) -> Eyelids | None:

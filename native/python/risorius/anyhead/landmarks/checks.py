@@ -7,14 +7,13 @@ import numpy as np
 
 from ...author.geometry.simplify import connected
 from ...author.geometry.skeleton import Doubles, Ints
-from ..form.fitting import Pose, Target, pose_normals
-from ..form.heads import head_form
+from ..form.fitting import Pose, Target
 from ..surface import Surface
 from .marks import LandmarkError
 
 LEAST, MOST = 200, 1_000_000  # vertices of a head
-_LOST = 0.6  # cm of the form: farther from the surface there is none of it
-_HALF = (0.85, 0.45)  # shares of the two halves of a face that are there, where one is missing
+_FLAT = 0.02  # of a mesh' size: so near to a plane its border lies in it
+_CUT = 0.3  # of the border: where so much of it lies in a plane the mesh was cut there
 _DEEP = 0.12  # cm of the form: a step so deep between the lids is an opening
 _ROWS, _COLUMNS = 25, 5  # rays through an eye
 _CROSSED = 0.04  # of the edges of a face that go through it, where it intersects itself
@@ -80,24 +79,33 @@ def _overlapping(low: Doubles, high: Doubles) -> Ints:
     return out
 
 
-def half_missing(target: Target, pose: Pose) -> bool:
-    """Whether one side of a face is there and the other is not.
+def completed(surface: Surface) -> list[Surface]:
+    """A surface with its mirror image, for each side on which it ends in a plane along the axes.
 
     Args:
-        target: the surface.
-        pose: of the form in it.
+        surface: it stays as it is.
     """
-    form = head_form()
-    shaped = form.shaped(pose.parts, pose.expressions)
-    face = form.weights[: form.skin] > 0.6
-    shares = []
-    for side in (1.0, -1.0):
-        own = np.flatnonzero(face & (side * form.mean[: form.skin, 0] > 0.5))
-        normals = pose_normals(form, pose, shaped)[own]
-        found, near, _ = target.pairs(pose.place(shaped[own]), normals, 0.3, 2 * pose.scale)
-        away = np.linalg.norm(pose.place(shaped[own]) - near, axis=1) / pose.scale
-        shares.append(float((found & (away < _LOST)).mean()))
-    return max(shares) > _HALF[0] and min(shares) < _HALF[1]
+    points = surface.points
+    border = points[surface.border()]
+    if not len(border):
+        return []
+    out = []
+    low, high = points.min(axis=0), points.max(axis=0)
+    for axis in range(3):
+        for end in (low[axis], high[axis]):
+            at_end = np.abs(border[:, axis] - end) < _FLAT * (high - low).max()
+            if at_end.mean() < _CUT:
+                continue
+            mirrored = points.copy()
+            mirrored[:, axis] = 2 * end - points[:, axis]
+            other = surface.triangles[:, ::-1] + len(points)
+            out.append(
+                Surface(
+                    np.concatenate([points, mirrored]),
+                    np.concatenate([surface.triangles, other]),
+                )
+            )
+    return out
 
 
 def check_eyes(where: str, target: Target, pose: Pose, points: dict[str, Doubles]) -> None:

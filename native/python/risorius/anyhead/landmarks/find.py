@@ -13,7 +13,7 @@ from ..form.fitting import FINE, Held, Pose, Target, fit, form_normals
 from ..form.heads import head_form
 from ..form.standing import NO_FACE, Standing, find_standing
 from ..surface import Surface
-from .checks import LEAST, check_eyes, check_mesh, half_missing, lips_apart, pieces
+from .checks import LEAST, check_eyes, check_mesh, completed, lips_apart, pieces
 from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
@@ -117,8 +117,7 @@ def find_form(target: Surface, hints: Hints | None = None) -> Found:
 def _looked_at(target: Surface, hints: Hints) -> tuple[Target, Pose, float]:
     """The piece of a surface that is a head, the model's pose in it and its error."""
     seen = Target(target)
-    all_of = _standing(seen, hints)
-    best = all_of[0]
+    best = _standing(seen, hints)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]
     parts = [p for p in parts if len(p.triangles) > _LARGE * len(parts[0].triangles)][:_TRIED]
     if best.error <= NO_FACE:
@@ -132,7 +131,7 @@ def _looked_at(target: Surface, hints: Hints) -> tuple[Target, Pose, float]:
         return seen, best.pose, best.error
     if heads:
         return heads[0][0], heads[0][1].pose, heads[0][1].error
-    raise LandmarkError(f"{hints.where}: {_why_none(seen, all_of, hints)}")
+    raise LandmarkError(f"{hints.where}: {_why_none(seen, hints)}")
 
 
 def _standing(seen: Target, hints: Hints) -> list[Standing]:
@@ -151,9 +150,10 @@ def _off(part: Surface, pose: Pose) -> bool:
     return large and float(np.linalg.norm(middle - [0.0, 0.0, -5.0])) > _AWAY
 
 
-def _why_none(seen: Target, tried: Sequence[Standing], hints: Hints) -> str:
+def _why_none(seen: Target, hints: Hints) -> str:
     """Why no face was found, for a sentence."""
-    if any(half_missing(seen, one.pose) for one in tried):
+    halves = completed(seen.surface)
+    if any(_standing(Target(whole), hints)[0].error <= NO_FACE for whole in halves):
         return "half of the face is missing: mirror it (in Blender: the modifier Mirror)"
     turned = Target(Surface(seen.surface.points, seen.surface.triangles[:, ::-1]))
     if _standing(turned, hints)[0].error <= NO_FACE:

@@ -24,6 +24,8 @@ _AWAY = 1e4  # cm: solids that are there touch nothing
 _ROUNDS = 4
 _MOVED = 1e-4  # cm: what moves less rests
 _AROUND = 15.0  # cm: what is further hides nothing
+_WAYS = 3  # of fifteen, along which what is seen is seen
+_SHORT = 0.2  # cm: what hangs on a longer edge is not beside what is seen
 _RIM = 2  # rings of vertices beside what is seen
 _MANY = 60_000  # vertices of a skin from which on the soft way is not tried
 Mask = npt.NDArray[np.bool_]
@@ -100,9 +102,9 @@ class Contacts:
         if len(self.skin.points) > _MANY:
             return self._lifted(displacement, posed)
         points = self.skin.points + displacement
-        moved, _, after = self._made().repair(points, posed, self._allowed(points), [])
+        moved, _, _ = self._made().repair(points, posed, self._allowed(points), [])
         out = displacement + np.asarray(moved)
-        return self._lifted(out, posed) if after.volume > LEAST else out
+        return self._lifted(out, posed) if self.volume(out, controls) > LEAST else out
 
     def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
         """Out along the teeth's normals, with what is around, where the soft way found nothing."""
@@ -173,14 +175,17 @@ class Contacts:
         points, normals = self.skin.points, self.skin.normals()[vertices]
         triangles = np.ascontiguousarray(self.skin.triangles, np.int32)
         tree = ClosestPoints(points, triangles)
-        seen = np.zeros(len(points), bool)
+        times = np.zeros(len(points), np.int64)
         for x, y in itertools.product((-1.0, -0.4, 0.0, 0.4, 1.0), (-0.7, 0.0, 0.7)):
             way = np.array([x, y, 1.0]) / np.linalg.norm([x, y, 1.0])
             faces = normals @ way > 0.05
             begin = points[vertices[faces]] + 0.01 * normals[faces]
             hit, _, _ = tree.first_hit(begin, np.broadcast_to(way, begin.shape), farthest=_AROUND)
-            seen[vertices[faces]] |= hit < 0
+            times[vertices[faces]] += hit < 0
+        seen = times >= _WAYS  # a slit between lips lets some through
         edges = self.skin.edges()
+        ends = points[edges[:, 0]] - points[edges[:, 1]]
+        edges = edges[np.linalg.norm(ends, axis=1) < _SHORT]
         for _ in range(_RIM):
             beside = edges[seen[edges].any(axis=1)]
             seen[beside] = True

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which objects are the head that somebody means, and which face lends its expressions."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ..base import parts
+from ..base.blender_types import ArmatureObject, Context, MeshObject
+from ..file import shape_key_head
+from . import points
+
+
+def head_of(context: Context) -> MeshObject | None:
+    """The mesh that is meant: that of a selected landmark, one with landmarks, the active one, else
+    the selected one with most vertices; None where no mesh is selected that is no face yet.
+
+    Args:
+        context: has the selection.
+    """
+    there = [item for item in (context.active_object, *context.selected_objects) if item]
+    for item in there:
+        above = points.head_of(item)
+        if above is not None and shape_key_head.is_plain(above):
+            return above
+    plain = [cast(MeshObject, item) for item in there if shape_key_head.is_plain(item)]
+    marked = next((item for item in plain if points.of(item)), None)
+    if marked is not None or not plain:
+        return marked
+    if plain[0] == context.active_object:
+        return plain[0]
+    return max(plain, key=lambda item: len(item.data.vertices))
+
+
+def face_of(context: Context) -> ArmatureObject | None:
+    """The face that is selected, else the only one of the scene, else None.
+
+    Args:
+        context: has the selection.
+    """
+    chosen = {parts.rig_of(item) for item in (context.active_object, *context.selected_objects)}
+    rigs = [rig for rig in chosen if rig is not None]
+    if not rigs:
+        rigs = [rig for rig in parts.rigs() if context.scene in rig.users_scene]
+    return rigs[0] if len(rigs) == 1 else None
+
+
+def face_there(context: Context) -> ArmatureObject:
+    """The face of face_of.
+
+    Args:
+        context: has the selection.
+
+    Raises:
+        FaceError: there is none, or there are several.
+    """
+    rig = face_of(context)
+    if rig is None:
+        raise FaceError(told("Select the head and one face."))
+    return rig

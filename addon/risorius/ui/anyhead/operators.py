@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+# Blender takes properties where Python has annotations:
+# pyright: reportInvalidTypeForm=false
+"""A head without expressions becomes a face, and a face takes the form of a head."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import cast
+
+import bpy
+
+from ... import native
+from ...logic.base.errors import FaceError
+from ...logic.base.sentences import told
+from ...scene.anyhead import finding, heads, making, points
+from ...scene.base import parts, saved
+from ...scene.base.blender_types import MeshObject
+from ...scene.character import build, runtime
+from ...scene.file import shape_key_head
+from .. import words
+from ..background_work import RunsBeside
+from ..blender_types import Context, ExportHelper, Menu, Operator, Result
+from ..common import explain, proposed_file, system_path
+from ..file.import_operators import import_character
+from ..file.rig_operators import MadeFace, show_made
+from .landmark_operators import OfHead, head_there
+
+TEMPLATES = [
+    ("SAMPLE", "Sample Man", "The man who came with Risorius"),
+    ("FACE", "Face of the Scene", "The face that is selected beside the head, or the only one"),
+    ("FILE", "DNA File", "Any face with expressions"),
+]
+_STAGES = {
+    making.FIT: words.mark("Fitting the face to the head: {share} %, Esc cancels"),
+    making.JOINTS: words.mark("Finding joints: {share} %, Esc cancels"),
+}
+
+
+class _Makes(RunsBeside, OfHead, ExportHelper):
+    """What both ways from a head to a face share."""
+
+    filename_ext = ".dna"
+
+    filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
+    use_family: bpy.props.BoolProperty(
+        name="Take Others Along",
+        description="Also meshes of the same armature or parent: eyes, teeth, hair",
+        default=True,
+    )
+
+    def invoke(self, context: Context, event: bpy.types.Event) -> Result:
+        self.wait_beside()
+        if not self.filepath:
+            self.filepath = proposed_file(head_there(context).name, ".dna")
+        return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context: Context) -> Result:
+        item = head_there(context)
+        self.filepath = system_path(self.filepath)
+        taken = shape_key_head.taken_with(context, item)
+        family = shape_key_head.relatives_of(context, taken) if self.use_family else []
+        try:
+            native.part("files.fileio").check_writable(self.filepath)
+            head = finding.read(context, item, [*taken[1:], *family])
+            task = self._begin(context, head)
+        except native.user_errors() as error:
+            self.report({"ERROR"}, self._said(error))
+            return {"CANCELLED"}
+        self._head, self._task = item.name, task
+        return self.begin(context, task)
+
+    def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
+        """The work."""
+        raise NotImplementedError
+
+    def _show(self, context: Context) -> Result:
+        """Import what was written."""
+        raise NotImplementedError
+
+    def finish(self, context: Context) -> Result:
+        """Show the face that was made."""
+        task = self._task
+        try:
+            if task.result is None:
+                raise task.error or RuntimeError("nothing was made")
+        except native.user_errors() as error:
+            self.report({"ERROR"}, self._said(error))
+            return {"CANCELLED"}
+        return self._show(context)
+
+    def _said(self, error: Exception) -> str:
+        """A sentence; those of the head and of the other face name these themselves."""
+        if isinstance(error, OSError):
+            return explain(error.filename or self.filepath, error)
+        return words.of_error(error)
+
+    def shown(self, share: int) -> str:
+        return words.say(_STAGES[self._task.stage], share=share)
+
+    def cancelled_text(self) -> str:
+        return words.say("No face was made.")
+
+
+class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
+    """Make a face of the selected head, which needs no expressions: it takes those of another"""
+
+    bl_idname = "risorius.make_rig_from_head"
+    bl_label = "Make Rig from Head"
+
+    template: bpy.props.EnumProperty(
+        name="Expressions of", description="Who lends the expressions", items=TEMPLATES
+    )
+    template_file: bpy.props.StringProperty(
+        name="File", description="A DNA file with expressions", subtype="FILE_PATH"
+    )
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="How strong expressions are: 1 as on the other face",
+        default=1.0,
+        min=0.0,
+        max=1.5,
+        subtype="FACTOR",
+    )
+    use_repair: bpy.props.BoolProperty(
+        name="Repair Contacts",
+        description="Let lids close on these eyes, lips meet, and keep skin out of eyes and teeth",
+        default=True,
+    )
+    joints: bpy.props.IntProperty(
+        name="Joints", description="Number of joints", default=120, min=2, max=1000
+    )
+    levels: bpy.props.IntProperty(
+        name="Levels of Detail",
+        description=(
+            "Number of levels of detail; each has fewer joints and vertices than the one before"
+        ),
+        default=8,
+        min=1,
+        max=32,
+    )
+
+    def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
+        wishes = shape_key_head.RigWishes(self.filepath, self.joints, self.levels)
+        transfer = making.Transfer(self.strength, self.use_repair)
+        return making.rig_task(head, self._template(context), transfer, wishes)
+
+    def _template(self, context: Context) -> making.Template:
+        """Who lends the expressions.
+
+        Raises:
+            FaceError: there is no such face.
+        """
+        if self.template == "FACE":
+            return making.Template(runtime.there(heads.face_there(context)).dna)
+        if self.template == "FILE":
+            if not self.template_file:
+                raise FaceError(told("Choose the DNA file that lends its expressions."))
+            return making.Template(path=system_path(self.template_file))
+        path = native.bundled_sample("man")
+        if path is None:
+            raise FaceError(told("This package has no sample face: choose a DNA file."))
+        return making.Template(path=str(path))
+
+    def _show(self, context: Context) -> Result:
+        made = cast("making.Made", self._task.result)
+        head = bpy.data.objects.get(self._head)
+        if head is not None and head.type == "MESH":
+            points.show(context, cast(MeshObject, head), made.finding.places)
+        face = MadeFace(self._head, made.shapes, *made.rigged)
+        return show_made(self, context, self.filepath, face, with_materials=True)
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(self, "template")
+        if self.template == "FILE":
+            layout.prop(self, "template_file")
+        layout.prop(self, "strength")
+        layout.prop(self, "use_repair")
+        layout.prop(self, "joints")
+        layout.prop(self, "levels")
+        layout.prop(self, "use_family")
+
+
+class RISORIUS_OT_conform_face(_Makes, Operator):
+    """Let a face take the form of the selected head; its topology, names and controls stay"""
+
+    bl_idname = "risorius.conform_face"
+    bl_label = "Conform Face to Head"
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        if not super().poll(context):
+            return False
+        if heads.face_of(context) is None:
+            cls.poll_message_set(words.say("Select the head and one face."))
+            return False
+        return True
+
+    def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
+        rig = heads.face_there(context)
+        source = bpy.path.abspath(saved.text(rig, parts.SOURCE))
+        if source and Path(source).resolve() == Path(self.filepath).resolve():
+            raise FaceError(told("This is the face's own file: choose another name."))
+        template = making.Template(runtime.there(rig).dna, source)
+        return making.conform_task(head, template, self.filepath)
+
+    def _show(self, context: Context) -> Result:
+        notes = cast("list[str]", self._task.result)
+        done = import_character(self, context, self.filepath, build.BuildOptions(), show=True)
+        for sentence in notes[:5]:
+            self.report({"INFO"}, sentence)
+        return done
+
+    def draw(self, context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        rig = heads.face_of(context)
+        if rig is not None:
+            words.write(layout, words.say("{name} takes its form.", name=parts.title_of(rig)))
+        layout.prop(self, "use_family")
+
+
+def draw_from_head(self: Menu, _context: Context) -> None:
+    """Entry of the menu Object."""
+    self.layout.operator(RISORIUS_OT_make_rig_from_head.bl_idname)
+
+
+CLASSES = (RISORIUS_OT_make_rig_from_head, RISORIUS_OT_conform_face)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""A face in five expressions and sixteen controls, as one sheet that somebody looks at.
+
+any_heads_sheet.py FACE.dna OUT.png [PIXELS]    needs Pillow; drawn without Blender, in clay
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import risorius
+from PIL import Image, ImageDraw, ImageFont
+from risorius.plot.drawing import shade
+from risorius.solving.surface import Surface
+
+PREFIX = "CTRL_expressions."
+BOTH = ("L", "R")
+# Controls of both sides without L and R, then those of the whole face.
+EXPRESSIONS = {
+    "neutral": {},
+    "smile": {"mouthCornerPull": 1, "eyeCheekRaise": 0.6, "eyeSquintInner": 0.4},
+    "blink": {"eyeBlink": 1},
+    "oh": {"mouthLipsPurseU": 0.7, "mouthLipsPurseD": 0.7, "mouthFunnelU": 0.3, "mouthFunnelD": 0.3,
+           "jawOpen": 0.4},
+    "shout": {"mouthStretch": 0.6, "mouthLowerLipDepress": 0.7, "mouthUpperLipRaise": 0.5,
+              "browDown": 0.6, "noseWrinkle": 0.5, "jawOpen": 0.9},
+}  # fmt: skip
+CONTROLS = (
+    *("jawOpen", "mouthCornerPull", "mouthCornerDepress", "mouthStretch"),
+    *("mouthLipsPurse", "mouthFunnel", "mouthUpperLipRaise", "mouthLowerLipDepress"),
+    *("mouthPress", "mouthLipsTogether", "mouthCheekBlow", "noseWrinkle"),
+    *("browRaiseIn", "browDown", "eyeSquintInner", "eyeLookDown"),
+)
+_COLUMNS = 7
+_COLOURS = (  # by parts of the names of meshes: their colour beside clay
+    ("teeth", (1.2, 1.15, 1.0)), ("tongue", (1.1, 0.6, 0.6)), ("gums", (1.1, 0.55, 0.55)),
+    ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)), ("lash", (0.25, 0.2, 0.2)),
+)  # fmt: skip
+_CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva")  # nothing one sees in clay
+
+
+def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
+    """float32[R], raw controls; a name stands for all that begin so and end with sides and lips."""
+    names = [name.removeprefix(PREFIX) for name in dna.raw_control_names]
+    out = np.zeros(len(names), np.float32)
+    for wanted, value in row.items():
+        for number, name in enumerate(names):
+            if name.startswith(wanted) and len(name) - len(wanted) <= 2:
+                out[number] = value
+    return out
+
+
+class Face:
+    """The meshes of LOD 0, ready to be drawn."""
+
+    def __init__(self, path: str) -> None:
+        self.dna = risorius.load(path)
+        self._seen = Surface(self.dna, risorius.Rig(self.dna), 0)
+        self._meshes = [
+            m for m in self._seen.mesh_indices
+            if not any(word in self.dna.mesh_names[m].lower() for word in _CLEAR)
+        ]  # fmt: skip
+        self._triangles, self._paint, first = [], [], 0
+        for m in self._meshes:
+            self._triangles.append(shade.triangles_of(self.dna.meshes[m]) + first)
+            count = len(self.dna.meshes[m].positions)
+            self._paint.append(self._colour(m, count))
+            first += count
+        self._frame = self._face()
+
+    def _face(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top of a picture: by the eyes, which stay where they are."""
+        eyes = [
+            np.asarray(self.dna.meshes[m].positions).mean(axis=0)
+            for side in ("eyeleft", "eyeright")
+            for m in self._meshes
+            if self.dna.mesh_names[m].lower().startswith(side)
+        ]
+        if len(eyes) == 2:
+            middle, apart = (eyes[0] + eyes[1]) / 2, float(np.linalg.norm(eyes[0] - eyes[1]))
+        else:
+            points = self._points({})
+            middle, apart = points.mean(axis=0), 0.3 * float(np.ptp(points[:, 0]))
+        self._depth = float(middle[2]) - 0.4 * apart  # about which the head is turned
+        across = 1.45 * apart
+        return middle[0] - across, middle[0] + across, middle[1] - 2.2 * apart, middle[1] + apart
+
+    def _colour(self, mesh: int, count: int) -> np.ndarray:
+        name = self.dna.mesh_names[mesh].lower()
+        colour = next((c for word, c in _COLOURS if word in name), (1.0, 0.92, 0.86))
+        paint = np.tile(np.array(colour), (count, 1))
+        if name.startswith(("eyeleft", "eyeright")):
+            points = np.asarray(self.dna.meshes[mesh].positions)
+            middle = (points.max(axis=0) + points.min(axis=0)) / 2
+            way = points - middle
+            ahead = way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), 1e-9)
+            paint[ahead > 0.87] = (0.35, 0.5, 0.7)
+            paint[ahead > 0.975] = (0.05, 0.05, 0.05)
+        return paint
+
+    def _points(self, row: dict[str, float]) -> np.ndarray:
+        raw = raw_of(self.dna, row)
+        return np.concatenate([self._seen.positions(raw, m) for m in self._meshes]).astype(float)
+
+    def picture(self, row: dict[str, float], size: int, turn: float = 0.3) -> Image.Image:
+        """The face seen a little from its left. Args: row  of controls; size, turn  radians."""
+        points, triangles = self._points(row), np.concatenate(self._triangles)
+        c, s = np.cos(turn), np.sin(turn)
+        middle = np.array([(self._frame[0] + self._frame[1]) / 2, 0.0, self._depth])
+        seen = (points - middle) @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) + middle
+        normals = shade.vertex_normals(seen, triangles)
+        whole = shade.Surface(seen, normals, triangles, np.concatenate(self._paint))
+        pixels = np.asarray(shade.render(whole, self._frame, size))[::1]
+        picture = Image.fromarray(pixels, "RGBA")
+        out = Image.new("RGB", picture.size, (38, 41, 46))
+        out.paste(picture, mask=picture)
+        return out
+
+
+def sheet(path: str, out: str, size: int = 260) -> None:
+    """All pictures of a face. Args: path  of the DNA file; out  of the picture; size  of one."""
+    face = Face(path)
+    rows = {**EXPRESSIONS, **{name: {name: 1.0} for name in CONTROLS}}
+    pictures = [(name, face.picture(row, size)) for name, row in rows.items()]
+    wide, high = pictures[0][1].width, size + 22
+    lines = -(-len(pictures) // _COLUMNS)
+    whole = Image.new("RGB", (wide * _COLUMNS, high * lines), (38, 41, 46))
+    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=14)
+    for number, (name, picture) in enumerate(pictures):
+        x, y = number % _COLUMNS * wide, number // _COLUMNS * high
+        whole.paste(picture, (x, y))
+        draw.text((x + 6, y + size + 3), name, fill=(215, 218, 222), font=font)
+    Path(out).parent.mkdir(parents=True, exist_ok=True)
+    whole.save(out)
+
+
+if __name__ == "__main__":
+    sheet(sys.argv[1], sys.argv[2], *map(int, sys.argv[3:4]))
