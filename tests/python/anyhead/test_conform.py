@@ -416,7 +416,7 @@ def test_the_command_writes_the_face_of_a_sculpt(face, tmp_path, capsys):
     command = ["author", "--conform", head, source, "-o", out]
     assert main([str(word) for word in command]) == 0
     said = capsys.readouterr().out
-    assert "head_lod0_mesh: the head has the face's own polygons" in said
+    assert "head_lod0_mesh: the head has the topology of the face" in said
     made = risorius.load(out)
     assert made.version == 5
     assert np.abs(posed(made, 0) - points).max() < 1e-3
@@ -426,7 +426,7 @@ def test_the_command_writes_the_face_of_a_sculpt(face, tmp_path, capsys):
     for more, code, sentence in (
         (["--bound"], 2, "--conform takes no --bound"),
         (["--scale", "nan"], 2, "--scale"),
-        (["--height-mm", "240"], 1, "the head has the face's own polygons"),
+        (["--height-mm", "240"], 1, "use scale instead"),
     ):
         assert main([str(word) for word in [*command, *more]]) == code
         assert sentence in capsys.readouterr().err

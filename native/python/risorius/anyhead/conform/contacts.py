@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Lids that close on a face close on the other head.
+"""Adjust controls that close the lids, so that the lids meet on the target head.
 
-A lid goes a share of the way around it as the form there changes, which says little about how wide
-the eye is. So each control that brings lid upon lid is looked at on both heads, and goes farther or
-less far until the same places meet. Joints take most of it, so all levels have it; blend shapes
-that the control has take what is left.
+The deformation gradient of a lid does not contain the height of the eye opening. For each control
+that brings two lids into contact on the source head, the joint columns are therefore scaled until
+the same points meet on the target head. Joints act at all LODs. The blend shapes of the control
+store the remaining difference.
 """
 
 from __future__ import annotations
@@ -24,21 +24,28 @@ from ..surface import Surface
 from .change import Change, Hold
 from .parts import Eye
 
-# Of the reach of a change, 2 cm of a head of 24: how far a control moves what it brings upon skin,
-# how near skins are that touch, how far apart they were, and what is too little to be mended.
+# Shares of the reach (2 cm on a head of 24 cm): the least motion of a vertex that comes into
+# contact, the largest distance in contact, the least distance in the neutral pose, and the largest
+# gap that is not corrected.
 _FAR, _NEAR, _APART, _LEAST = 0.1, 0.05, 0.12, 0.004
-_FACING = 0.2  # cosine: skins that touch look at each other
-# Of the reach: how far a place that touches says what those around it do, by joints and by shapes.
+_FACING = 0.2  # least cosine between one normal and the opposite of the other normal
+# Shares of the reach: smoothing of the correction around a contact, for joints and for shapes.
 _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
-_SEEN = 0.001  # of the reach: what a shape adds to a vertex at least
-_MOST, _FEW = 0.8, 8  # of the way: what is added to it at most; places that touch at least
-_LARGEST, _FADES = 0.15, 0.5  # of the reach: a step of a shape, and how far it goes along
-_LIDS = 1.7  # of an eye's radius: where lids are
+_SEEN = 0.001  # of the reach: the least delta that is added to a blend shape
+_MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts
+_LARGEST, _FADES = 0.15, 0.5  # of the reach: largest delta of one step, and its fall-off
+_LIDS = 1.7  # of the radius of an eye: skin within this distance of its centre is a lid
 
 
 class Touch(NamedTuple):
-    """Places of a skin that a control brings upon others: int64[n], int64[n, 3], float64[n, 3],
-    float64[n, 3] from the place to the vertex."""
+    """Contacts of the skin with itself at a control value of 1.
+
+    Attributes:
+        vertex: int64[n], the vertices in contact.
+        corners: int64[n, 3], the triangle that each vertex touches.
+        shares: float64[n, 3], barycentric coordinates of the contact point.
+        away: float64[n, 3], from the contact point to the vertex.
+    """
 
     vertex: Ints
     corners: Ints
@@ -47,7 +54,7 @@ class Touch(NamedTuple):
 
 
 class _Posed:
-    """The skin of a face at one control at 1."""
+    """The skin of a face with one control at 1."""
 
     def __init__(self, dna: Dna, skin: int) -> None:
         self.dna, self.skin = dna, skin
@@ -58,14 +65,14 @@ class _Posed:
         self.rest = np.asarray(self._probe.positions(self.raw()), np.float64)
 
     def raw(self, control: int = -1) -> npt.NDArray[np.float32]:
-        """float32[R]: rest, or a control at 1."""
+        """float32[R]: the neutral pose, with one control at 1 if its index is given."""
         out = np.array(self.rig.initial_raw_controls, np.float32)
         if control >= 0:
             out[control] = 1
         return out
 
     def at(self, control: int) -> Doubles:
-        """float64[V, 3]."""
+        """float64[V, 3]: vertex positions with one control at 1."""
         return np.asarray(self._probe.positions(self.raw(control)), np.float64)
 
 
@@ -78,16 +85,16 @@ def keep_contacts(
     holds: Mapping[int, Hold],
     tell: Callable[[float], object],
 ) -> Dna:
-    """The conformed face with controls that close the lids that they close on the first one.
+    """Correct the lid controls of a conformed face.
 
     Args:
-        dna: the face before.
-        out: after.
-        skin: its mesh of skin.
-        change: of the skin.
-        eyes: of the face.
-        holds: of each mesh that lies on the skin, where.
-        tell: told the share that is done.
+        dna: the source face.
+        out: the conformed face; it is not changed.
+        skin: the index of the skin mesh.
+        change: the deformation of the skin.
+        eyes: the eyeballs.
+        holds: bindings of the meshes that follow the skin, by mesh index.
+        tell: told the share that is done, 0 to 1.
     """
     if not eyes or not len(dna.raw_control_names):
         return out
@@ -118,7 +125,7 @@ def keep_contacts(
 
 
 def _touch(face: _Posed, control: int, change: Change, lids: npt.NDArray[np.bool_]) -> Touch | None:
-    """What a control brings of the lids upon other skin; None: nothing, or too little to say."""
+    """The lid contacts of a control; None if there are too few."""
     posed = face.at(control)
     far = np.linalg.norm(posed - face.rest, axis=1)
     moving = np.flatnonzero(lids & (far > _FAR * change.reach))
@@ -146,14 +153,14 @@ def _touch(face: _Posed, control: int, change: Change, lids: npt.NDArray[np.bool
 
 
 def _gaps(face: _Posed, posed: Doubles, touch: Touch, change: Change) -> Doubles:
-    """float64[n, 3]: what is missing until places touch as they do on the first head."""
+    """float64[n, 3]: from each vertex to the position at which the contact is restored."""
     other = np.einsum("nk,nkd->nd", touch.shares, posed[touch.corners])
     wanted = np.einsum("nij,nj->ni", change.linear[touch.vertex], touch.away)
     return np.asarray(other + wanted - posed[touch.vertex])
 
 
 def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V]: what is to be added to the way of each vertex, of it; None: too little."""
+    """float64[V]: share of its motion that each vertex needs in addition; None without a gap."""
     posed = face.at(control)
     ways = posed - face.rest
     way = ways[touch.vertex] - np.einsum("nk,nkd->nd", touch.shares, ways[touch.corners])
@@ -172,9 +179,9 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
 
 
 def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles | None:
-    """float64[V, 3]: what is to be added to the way of each vertex; None: too little.
+    """float64[V, 3]: motion that each vertex needs in addition; None without a gap.
 
-    Each lid goes its share; what lies behind its rim goes along as far as it moves.
+    Both lids move in proportion to their motion. The correction fades out behind the rims.
     """
     posed = face.at(control)
     ways = posed - face.rest
@@ -193,7 +200,7 @@ def _nearer(face: _Posed, control: int, touch: Touch, change: Change) -> Doubles
         weight, near = _around(face.rest[own], face.rest[touch.vertex], _BY_SHAPES * change.reach)
         alike = ways[own] @ own_way.T
         far = np.linalg.norm(ways[own], axis=1)
-        weight = weight * np.maximum(alike, 0)  # the other lid goes the other way
+        weight = weight * np.maximum(alike, 0)  # excludes the opposite lid
         total = weight.sum(axis=1)
         total, none = np.where(total > 0, total, 1), total <= 0
         goes = np.clip(far / np.maximum(weight @ length / total, 1e-12), 0, 1)
@@ -208,15 +215,15 @@ def _moving(ways: Doubles, change: Change) -> Ints:
 
 
 def _around(points: Doubles, places: Doubles, reach: float) -> tuple[Doubles, Doubles]:
-    """float64[n, m]: how much each place says about each point; float64[n]: the square of how far
-    the nearest place is."""
+    """float64[n, m]: Gaussian weights of the contacts at each point; float64[n]: the squared
+    distance of the closest contact."""
     apart = ((points[:, None] - places) ** 2).sum(axis=2)
     near = apart.min(axis=1)
     return np.exp(-(apart - near[:, None]) / (2 * reach**2)), near
 
 
 def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna | None:
-    """The face with joints that a control moves farther; None: it moves none."""
+    """The face with scaled joint columns of a control; None if the control moves no joint."""
     dna = face.dna
     vertex, joint, weight = sk.skin_entries(dna.meshes[face.skin])
     held = np.bincount(joint, weights=weight, minlength=len(dna.joint_names))
@@ -245,7 +252,7 @@ def _joints_go_on(face: _Posed, control: int, more: Doubles, *_: object) -> Dna 
 def _shapes_go_on(
     face: _Posed, control: int, ways: Doubles, holds: Mapping[int, Hold], change: Change
 ) -> Dna | None:
-    """The face with blend shapes of a control that add to its way; None: it has none."""
+    """The face with deltas added to the blend shapes of a control; None if it has none."""
     dna = face.dna
     channels = dna.blend_shape_channels
     driven = np.asarray(channels.output_indices)[np.asarray(channels.input_indices) == control]
@@ -271,7 +278,7 @@ def _shapes_go_on(
 
 
 def _motions(dna: Dna, face: _Posed, control: int) -> Doubles:
-    """float64[J, 3, 3]: how a control turns what is fixed to each joint."""
+    """float64[J, 3, 3]: the linear part of each joint's skinning matrix with a control at 1."""
     deltas = np.asarray(face.rig.evaluate(face.raw(control)).joints, np.float64)
     rest = sk.world_matrices(dna, np.zeros_like(deltas))[:, :3, :3]
     return sk.world_matrices(dna, deltas)[:, :3, :3] @ np.linalg.inv(rest)
@@ -285,7 +292,7 @@ def _longer(
     change: Change,
     motions: Doubles,
 ) -> _native.BlendShapeTarget:
-    """A blend shape that adds ways of the skin's vertices, float64[V, 3], after it is skinned."""
+    """The blend shape target with deltas added, so that the posed skin moves by `ways`."""
     if hold is None:
         way = ways
     else:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face takes the form of a head: a sculpt of its own topology, or any other mesh."""
+"""Conform a face to a head from a file or another program: a sculpt of the same topology, or any mesh."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ _STOOD, _LAID = 0.15, 0.75  # shares of the work at whose ends the steps are
 
 @dataclass
 class Conformed:
-    """A face that took the form of a head.
+    """The result of conform_face.
 
     Attributes:
-        dna: the face.
-        moved: float64[V, 3], where its skin lies now.
-        sculpted: the meshes that the head has with the face's own polygons; none where the face's
-            topology was laid onto another.
-        notes: what was guessed and done, a sentence each.
+        dna: the conformed face.
+        moved: float64[V, 3], the vertex positions of its skin.
+        sculpted: names of the meshes that the head has with the topology of the face; empty if the
+            skin was registered onto a head of another topology.
+        notes: sentences about guesses and steps.
     """
 
     dna: Dna
@@ -66,26 +66,27 @@ def conform_face(
     wishes: Wishes | None = None,
     threads: int = 0,
 ) -> Conformed:
-    """The face with the form of a head: the same names, counts and layers.
+    """Conform a face to a head.
 
-    A head that has the face's own polygons, cut into triangles or not, gives the places of their
-    vertices; onto another one the skin of the face is laid, and its own eyes say where eyes are.
-    The face stays where it is: a head of another place, unit or direction comes there.
+    If the head has the topology of the face (also triangulated), its vertex positions are taken
+    directly. The skin of the face is registered onto any other head, and the eyes of the head give
+    the positions of the eyes. The result keeps the axes, the unit and the position of the face.
 
     Args:
-        dna: stays as it is.
+        dna: the source face; it is not changed.
         parts: the meshes of the head in one space.
-        marks: landmarks that a person gave, in the space of the parts.
+        marks: landmarks that the user placed, in the space of the parts.
         progress: told the share that is done, 0 to 1; False stops.
         where: what errors call the head.
-        unit: of the numbers as the format of the head has it, "cm" or "m".
-        wishes: what is said of the head and not guessed.
+        unit: the unit of the head's file format, "cm" or "m".
+        wishes: values that the user gave and that are not guessed.
         threads: 0: one for each core.
 
     Raises:
-        AnyHeadError: no polygons, no skin to the face, or wishes that cannot be.
-        LandmarkError: no face, or landmarks that are missing.
-        RegistrationError: nothing of the head near the face.
+        AnyHeadError: the head has no polygons, the face has no skin, or a value of `wishes` is
+            invalid.
+        LandmarkError: no face was found in the head, or landmarks are missing.
+        RegistrationError: no surface of the head is near the face.
         Stopped: progress said False.
     """
     wishes = wishes or Wishes()
@@ -98,11 +99,11 @@ def conform_face(
     if name in moved:
         if wishes.height_mm:
             raise AnyHeadError(
-                f"{where}: the head has the face's own polygons and is as large as its numbers "
-                "say; scale multiplies them, a height was not expected"
+                f"{where}: a height was given, but the head has the topology of the face and keeps "
+                "its size; use scale instead"
             )
         there, note = into_own_space(dna, moved, wishes.scale or None)
-        notes = [f"{joined(list(there))}: the head has the face's own polygons", note]
+        notes = [f"{joined(list(there))}: the head has the topology of the face", note]
         made = conform(dna, there, telling(progress, 0.0, 1.0))
         return Conformed(made, there[name], list(there), [n for n in notes if n])
     standing = stand(where, parts, unit, wishes, marks)
@@ -113,7 +114,7 @@ def conform_face(
 
 
 def parts_of(dna: Dna) -> list[HeadPart]:
-    """The meshes of LOD 0 of a face, as those of a head.
+    """The meshes of LOD 0 of a face as parts of a head, standing.
 
     Args:
         dna: the face.
@@ -132,8 +133,8 @@ def parts_of(dna: Dna) -> list[HeadPart]:
 def _laid(
     dna: Dna, skin: int, standing: Standing, threads: int, progress: Progress | None
 ) -> tuple[Doubles, list[Ball]]:
-    """Where the vertices of the face's skin lie on a head, and the head's eyeballs; in the axes,
-    the unit and the place of the face."""
+    """The vertex positions of the face's skin on a head, and the eyeballs of the head, in the axes,
+    the unit and the position of the face."""
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     before = np.asarray(dna.meshes[skin].positions, np.float64)
     template = _outward(surface_of(dna.meshes[skin], size * before @ axes))
@@ -161,7 +162,7 @@ def _laid(
 
 
 def _outward(surface: Surface) -> Surface:
-    """The same with triangles that face outward; a mirrored file has them the other way."""
+    """The surface with triangles that face outward. Left-handed files have them inverted."""
     middle = surface.points.mean(axis=0)
     corners = surface.points[surface.triangles[:, 0]] - middle
     if float((corners * surface.face_normals()).sum()) >= 0:
@@ -170,18 +171,20 @@ def _outward(surface: Surface) -> Surface:
 
 
 def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:
-    """Whether a mesh is a sculpt of a face's skin: its vertices and polygons.
+    """Whether a mesh has the vertex count and the polygons of a face's skin.
 
     Args:
         dna: the face.
-        mesh: in question.
+        mesh: the mesh.
     """
     skin = skin_of(dna)
     return skin >= 0 and has_polygons_of(dna.meshes[skin], mesh)
 
 
 def standing_axes(dna: Dna) -> Doubles:
-    """float64[3, 3]: rows are the file's axes in x left, y up, z front; points @ it stand.
+    """float64[3, 3]: the axes of a file in the standing space (x left, y up, z front), as rows.
+
+    Standing positions are `points @ standing_axes(dna)`.
 
     Args:
         dna: the face.
@@ -190,5 +193,9 @@ def standing_axes(dna: Dna) -> Doubles:
 
 
 def mm_of(dna: Dna) -> float:
-    """Millimetres of a unit of the file."""
+    """Millimetres per unit of a file.
+
+    Args:
+        dna: the file.
+    """
     return UNITS.get(dna.translation_unit, UNITS["cm"])
