@@ -49,8 +49,8 @@ def conform(
     """Conform a face to the vertex positions of another head.
 
     Meshes that `moved` does not name follow the skin: lashes and coarser LODs are bound to the
-    closest point, each eye keeps its shape and is fitted into the lids, teeth and tongue move as one
-    rigid part. A joint follows the skin that it carries. Blend shapes and joint translations are
+    closest point, each eye keeps its shape and is fitted into the lids, and teeth and tongue move
+    as one rigid part. A joint follows the skin that it carries. Blend shapes and joint translations are
     transformed by the deformation gradients. Joint rotations and the layers of solvers and networks
     stay unchanged. Controls that close the lids are adjusted until the lids meet again.
 
