@@ -50,9 +50,9 @@ def conform(
 
     Meshes that `moved` does not name follow the skin: lashes and coarser LODs are bound to the
     closest point, each eye keeps its shape and is fitted into the lids, and teeth and tongue move
-    as one rigid part. A joint follows the skin that it carries. Blend shapes and joint translations are
-    transformed by the deformation gradients. Joint rotations and the layers of solvers and networks
-    stay unchanged. Controls that close the lids are adjusted until the lids meet again.
+    as one rigid part. A joint follows the skin that it carries. Blend shapes and joint translations
+    are transformed by the deformation gradients. Joint rotations and the layers of solvers and
+    networks stay unchanged. Controls that close the lids are adjusted until the lids meet again.
 
     Args:
         dna: the source face; it is not changed.
@@ -189,7 +189,7 @@ def _target(target: BlendShapeTarget, linear: Doubles) -> BlendShapeTarget:
 
 
 def _normals(mesh: Mesh, moved: Moved) -> Doubles:
-    """float64[N, 3]: the normals of the file, rotated as the vertex normal of the surface rotates."""
+    """float64[N, 3]: the normals of the file, rotated with the vertex normals of the surface."""
     own = np.asarray(mesh.normals, np.float64)
     rows = np.asarray(mesh.layout_normals, np.int64)
     vertex = np.full(len(own), -1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Conform a face to a head from a file or another program: a sculpt of the same topology, or any mesh."""
+"""Conform a face to a head from a file or another program: a sculpt of the face, or any mesh."""
 
 from __future__ import annotations
 

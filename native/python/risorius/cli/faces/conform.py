@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--conform",
         type=Path,
         metavar="HEAD",
-        help="conform the DNA file to this head (OBJ, glTF, FBX, a folder of OBJ files, another DNA "
-        "file, or a sculpt of the face): its topology, names, counts and layers stay",
+        help="conform the DNA file to this head (OBJ, glTF, FBX, a folder of OBJ files, another "
+        "DNA file, or a sculpt of the face): its topology, names, counts and layers stay",
     )
 
 
