@@ -36,9 +36,10 @@ CONTROLS = (
 _COLUMNS = 7
 _COLOURS = (  # by parts of the names of meshes: their colour beside clay
     ("teeth", (1.2, 1.15, 1.0)), ("tongue", (1.1, 0.6, 0.6)), ("gums", (1.1, 0.55, 0.55)),
-    ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)), ("lash", (0.25, 0.2, 0.2)),
+    ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)),
 )  # fmt: skip
-_CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva")  # nothing one sees in clay
+# What is nothing without its picture: glass, wet edges, cards of lashes and hair.
+_CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva", "lash", "hair", "brows")
 
 
 def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
@@ -75,8 +76,7 @@ class Face:
         eyes = [
             np.asarray(self.dna.meshes[m].positions).mean(axis=0)
             for side in ("eyeleft", "eyeright")
-            for m in self._meshes
-            if self.dna.mesh_names[m].lower().startswith(side)
+            for m in [m for m in self._meshes if self._base(m) == side][:1]
         ]
         if len(eyes) == 2:
             middle, apart = (eyes[0] + eyes[1]) / 2, float(np.linalg.norm(eyes[0] - eyes[1]))
@@ -86,6 +86,9 @@ class Face:
         self._depth = float(middle[2]) - 0.4 * apart  # about which the head is turned
         across = 1.45 * apart
         return middle[0] - across, middle[0] + across, middle[1] - 2.2 * apart, middle[1] + apart
+
+    def _base(self, mesh: int) -> str:
+        return self.dna.mesh_names[mesh].lower().partition("_lod")[0]
 
     def _colour(self, mesh: int, count: int) -> np.ndarray:
         name = self.dna.mesh_names[mesh].lower()

@@ -99,11 +99,11 @@ def rig_task(
 
     def work(_progress: Progress, cancelled: Cancelled) -> Made:
         tell = telling(task.part(FIT, 0.0, _FITTED), cancelled)
-        made, read = _carry_over(head, template.load(), transfer, tell)
+        made, read = _carry_over(head, template, transfer, tell)
         tell = telling(task.part(JOINTS, _FITTED, 1.0), cancelled)
         rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell)
         if not cancelled():
-            rig.dna.save(wishes.path)
+            _write(rig.dna, read, wishes.path)
         found = finding.on_object(head, made.landmarks)
         made.shapes.notes = list(dict.fromkeys(made.notes))
         odd = [sentence for sentence in read.odd if sentence not in made.notes]
@@ -114,9 +114,10 @@ def rig_task(
 
 
 def _carry_over(
-    head: finding.Head, dna: native.Dna, transfer: Transfer, progress: Callable[[float], bool]
+    head: finding.Head, template: Template, transfer: Transfer, progress: Callable[[float], bool]
 ) -> tuple[native.Onto, native.Read]:
     """The head with the expressions of a face, and the face of blend shapes of it."""
+    dna, own = template.load(), {part.source for part in head.parts}
     onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
     options = onto.OntoOptions(
         strength=transfer.strength,
@@ -128,7 +129,19 @@ def _carry_over(
     name = head.parts[0].name
     made: native.Onto = onto.onto(name, head.parts, "cm", dna, options, progress)
     made.shapes.name = name
+    if template.path:
+        lend = native.part("anyhead.borrowing").lend_materials
+        lend(made.shapes.parts, dna, Path(template.path), own)
     return made, onto.shape_face(made, dna, name)
+
+
+def _write(dna: native.Dna, read: native.Read, path: str) -> None:
+    """A face, and the textures of what it has from the other face."""
+    textures = native.part("author.heads.textures")
+    found = textures.textures_of(read.materials, textures.texture_folder(Path(path)))
+    named = textures.metadata_of(dna.mesh_names, read.materials, found)
+    dna.metadata = dict(dna.metadata) | named
+    native.part("files.fileio").write_all({Path(path): dna.to_bytes(), **found.files})
 
 
 def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[list[str]]:

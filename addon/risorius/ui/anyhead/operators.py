@@ -15,7 +15,7 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...scene.anyhead import finding, heads, making, points
 from ...scene.base import parts, saved
-from ...scene.base.blender_types import MeshObject
+from ...scene.base.blender_types import ArmatureObject, MeshObject
 from ...scene.character import build, runtime
 from ...scene.file import shape_key_head
 from .. import words
@@ -150,7 +150,8 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
             FaceError: there is no such face.
         """
         if self.template == "FACE":
-            return making.Template(runtime.there(heads.face_there(context)).dna)
+            rig = heads.face_there(context)
+            return making.Template(runtime.there(rig).dna, _source(rig))
         if self.template == "FILE":
             if not self.template_file:
                 raise FaceError(told("Choose the DNA file that lends its expressions."))
@@ -199,7 +200,7 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
     def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
         rig = heads.face_there(context)
-        source = bpy.path.abspath(saved.text(rig, parts.SOURCE))
+        source = _source(rig)
         if source and Path(source).resolve() == Path(self.filepath).resolve():
             raise FaceError(told("This is the face's own file: choose another name."))
         template = making.Template(runtime.there(rig).dna, source)
@@ -220,6 +221,11 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
         if rig is not None:
             words.write(layout, words.say("{name} takes its form.", name=parts.title_of(rig)))
         layout.prop(self, "use_family")
+
+
+def _source(rig: ArmatureObject) -> str:
+    """The file that a face came from, which may be gone; "": none."""
+    return bpy.path.abspath(saved.text(rig, parts.SOURCE))
 
 
 def draw_from_head(self: Menu, _context: Context) -> None:

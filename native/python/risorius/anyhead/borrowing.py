@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: MIT
+"""The materials of what a head gets from a template: eyes, teeth and lashes keep their textures."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+from .. import Dna
+from ..author.heads.joining import FacePart
+from ..author.heads.parts import Material
+from ..author.heads.textures import texture_folder
+from ..base.reading import read_file
+from ..files.names import is_file_name
+
+_ROLES = ("color", "normal", "roughness")
+_MOST_BYTES = 1 << 28  # of a picture
+
+
+def lend_materials(
+    parts: Sequence[FacePart], template: Dna, path: Path, own: Collection[str]
+) -> None:
+    """Give the parts of a face that are a template's the materials that they have there.
+
+    Args:
+        parts: of the face; those that are the template's have its mesh as their source, and get
+            their material.
+        template: the face that lends.
+        path: of its file, beside which its textures lie; what is missing is left out.
+        own: sources of the head's own meshes, whatever a template's are called.
+
+    Raises:
+        OSError: a texture that is there cannot be read.
+    """
+    lent = _materials(template, path)
+    for part in parts:
+        if part.material is None and part.source not in own:
+            part.material = lent.get(part.source)
+
+
+def _materials(template: Dna, path: Path) -> dict[str, Material]:
+    """By the names of meshes."""
+    out: dict[str, Material] = {}
+    read: dict[str, bytes | None] = {}
+    for key, name in template.metadata.items():
+        kind, _, rest = key.partition(":")
+        mesh, _, role = rest.partition(":")
+        if kind != "texture" or role not in _ROLES or not is_file_name(name):
+            continue
+        if name not in read:
+            read[name] = _bytes(path, name)
+        data = read[name]
+        if data is not None:
+            base = mesh.partition("_lod")[0]
+            out.setdefault(mesh, Material(base)).pictures[role] = data
+    return out
+
+
+def _bytes(path: Path, name: str) -> bytes | None:
+    for folder in (texture_folder(path), path.parent):
+        if (folder / name).is_file():
+            return read_file(folder / name, _MOST_BYTES, found=True)
+    return None
