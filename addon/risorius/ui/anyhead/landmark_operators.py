@@ -110,6 +110,7 @@ def show_found(
         found: of finding.find.
     """
     points.show(context, head, found.places)
+    hide_lines(context)
     for sentence in found.notes[:5]:
         operator.report({"INFO"}, words.local(sentence))
     missing = [name for name in found.missing if name not in points.of(head)]
@@ -119,6 +120,19 @@ def show_found(
         return
     text = "{count} landmarks found"
     operator.report({"INFO"}, words.say(text, count=len(found.places)))
+
+
+def hide_lines(context: Context) -> None:
+    """Let the 3D views of the window draw no lines from landmarks to the origin of their head.
+
+    Args:
+        context: without a window nothing happens.
+    """
+    screen = context.window.screen if context.window is not None else None
+    for area in screen.areas if screen is not None else ():
+        if area.type == "VIEW_3D":
+            space = cast(bpy.types.SpaceView3D, area.spaces.active)
+            space.overlay.show_relationship_lines = False
 
 
 class RISORIUS_OT_place_landmark(OfHead, Operator):

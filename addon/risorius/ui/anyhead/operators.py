@@ -24,7 +24,7 @@ from ..blender_types import Context, ExportHelper, Menu, Operator, Result
 from ..common import explain, proposed_file, system_path
 from ..file.import_operators import import_character
 from ..file.rig_operators import MadeFace, show_made
-from .landmark_operators import OfHead, head_there
+from .landmark_operators import OfHead, head_there, hide_lines
 
 TEMPLATES = [
     ("SAMPLE", "Sample Man", "The man who came with Risorius"),
@@ -166,6 +166,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         head = bpy.data.objects.get(self._head)
         if head is not None and head.type == "MESH":
             points.show(context, cast(MeshObject, head), made.finding.places)
+            hide_lines(context)
         face = MadeFace(self._head, made.shapes, *made.rigged)
         return show_made(self, context, self.filepath, face, with_materials=True)
 

@@ -18,7 +18,7 @@ _MOST = 8  # lines of a list
 class RISORIUS_PT_head(FacePanel, Panel):
     bl_idname = "RISORIUS_PT_head"
     bl_label = "Face from Head"
-    bl_order = 1
+    bl_order = 0  # while a head is selected it is what one works on
 
     @classmethod
     def poll(cls, context: Context) -> bool:
