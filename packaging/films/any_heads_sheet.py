@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A face in five expressions and sixteen controls, as one sheet that somebody looks at.
 
-any_heads_sheet.py FACE.dna OUT.png [PIXELS]    needs Pillow; drawn without Blender, in clay
+any_heads_sheet.py FACE.dna... OUT.png    needs Pillow; drawn without Blender, in clay; of several
+                                          faces each has a row of the five expressions
 """
 
 from __future__ import annotations
@@ -122,22 +123,41 @@ class Face:
         return out
 
 
-def sheet(path: str, out: str, size: int = 260) -> None:
-    """All pictures of a face. Args: path  of the DNA file; out  of the picture; size  of one."""
-    face = Face(path)
-    rows = {**EXPRESSIONS, **{name: {name: 1.0} for name in CONTROLS}}
-    pictures = [(name, face.picture(row, size)) for name, row in rows.items()]
-    wide, high = pictures[0][1].width, size + 22
-    lines = -(-len(pictures) // _COLUMNS)
-    whole = Image.new("RGB", (wide * _COLUMNS, high * lines), (38, 41, 46))
+def put(rows: list[list[tuple[str, Image.Image]]], out: str) -> None:
+    """Pictures in rows, with what each shows. Args: rows; out  path of the sheet."""
+    first = rows[0][0][1]
+    wide, high = first.width, first.height + 22
+    whole = Image.new("RGB", (wide * max(map(len, rows)), high * len(rows)), (38, 41, 46))
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=14)
-    for number, (name, picture) in enumerate(pictures):
-        x, y = number % _COLUMNS * wide, number // _COLUMNS * high
-        whole.paste(picture, (x, y))
-        draw.text((x + 6, y + size + 3), name, fill=(215, 218, 222), font=font)
+    for line, row in enumerate(rows):
+        for column, (name, picture) in enumerate(row):
+            whole.paste(picture, (column * wide, line * high))
+            place = (column * wide + 6, line * high + first.height + 3)
+            draw.text(place, name, fill=(215, 218, 222), font=font)
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     whole.save(out)
 
 
+def sheet(path: str, out: str, size: int = 260) -> None:
+    """All pictures of a face. Args: path  of its file; out  of the sheet; size  of a picture."""
+    face = Face(path)
+    shown = {**EXPRESSIONS, **{name: {name: 1.0} for name in CONTROLS}}
+    pictures = [(name, face.picture(row, size)) for name, row in shown.items()]
+    put([pictures[n : n + _COLUMNS] for n in range(0, len(pictures), _COLUMNS)], out)
+
+
+def beside(paths: list[str], out: str, size: int = 260) -> None:
+    """A row of expressions for each of several faces. Args: paths, out, size  as for sheet."""
+    rows = []
+    for path in paths:
+        face, stem = Face(path), Path(path).stem
+        rows.append([(f"{stem}: {n}", face.picture(row, size)) for n, row in EXPRESSIONS.items()])
+    put(rows, out)
+
+
 if __name__ == "__main__":
-    sheet(sys.argv[1], sys.argv[2], *map(int, sys.argv[3:4]))
+    *faces, target = sys.argv[1:]
+    if len(faces) == 1:
+        sheet(faces[0], target)
+    else:
+        beside(faces, target)
