@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A face in five expressions and sixteen controls, as one sheet that somebody looks at.
 
-any_heads_sheet.py FACE.dna... OUT.png    needs Pillow; drawn without Blender, in clay; of several
-                                          faces each has a row of the five expressions
+any_heads_sheet.py FACE.dna... [CLIP.rzc] OUT.png    needs Pillow; drawn without Blender, in clay
+
+Of several faces each has a row of the five expressions; with a clip, a row of seven of its moments.
 """
 
 from __future__ import annotations
@@ -48,6 +49,7 @@ def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
     names = [name.removeprefix(PREFIX) for name in dna.raw_control_names]
     out = np.zeros(len(names), np.float32)
     for wanted, value in row.items():
+        wanted = wanted.removeprefix(PREFIX)  # noqa: PLW2901
         for number, name in enumerate(names):
             if name.startswith(wanted) and len(name) - len(wanted) <= 2:
                 out[number] = value
@@ -155,9 +157,33 @@ def beside(paths: list[str], out: str, size: int = 260) -> None:
     put(rows, out)
 
 
+def speaking(paths: list[str], clip: str, out: str, size: int = 200) -> None:
+    """A row of moments of a clip for each face.
+
+    Args:
+        paths: of DNA files.
+        clip: path of the animation.
+        out: of the sheet.
+        size: of a picture.
+    """
+    take, rows = risorius.Clip.load(clip), []
+    for path in paths:
+        face, row = Face(path), []
+        for share in np.linspace(0.1, 0.9, _COLUMNS):
+            at = float(take.start + share * take.duration)
+            values = np.asarray(take.sample(np.array([at])))[0]
+            said = dict(zip(take.names, values.tolist(), strict=True))
+            row.append((f"{Path(path).stem}: {at:.2f} s", face.picture(said, size)))
+        rows.append(row)
+    put(rows, out)
+
+
 if __name__ == "__main__":
-    *faces, target = sys.argv[1:]
-    if len(faces) == 1:
+    *given, target = sys.argv[1:]
+    faces = [path for path in given if path.endswith(".dna")]
+    if len(faces) < len(given):
+        speaking(faces, given[-1], target)
+    elif len(faces) == 1:
         sheet(faces[0], target)
     else:
         beside(faces, target)
