@@ -56,9 +56,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
         head: the mesh that is the face.
         others: meshes that belong to it: eyes, teeth, hair.
     """
-    rows = [
-        shape_key_head.part_of(context, item, head, with_keys=False) for item in (head, *others)
-    ]
+    rows = [shape_key_head.part_at_rest(context, item, head) for item in (head, *others)]
     turn = shape_key_head.turn_of(context, head)
     there = points.of(head)
     fixed = {name: turn @ place for name, place in points.by_hand(there).items()}
