@@ -151,6 +151,9 @@ def test_a_face_takes_the_form_of_a_head(head, onto, dna_file, tmp_path):
     head.select_set(True)
     assert risorius.conform_face(filepath=str(tmp_path / "new.dna")) == {"FINISHED"}
     assert len(rigs()) == 2
+    new = next(item for item in rigs() if item != rig)
+    left = min(scene.evaluated(mesh)[:, 0].min() for mesh in scene.meshes(new).values())
+    assert left > max((head.matrix_world @ v.co).x for v in head.data.vertices)  # beside it
     ((dna, read),) = onto.asked
     assert dna is scene.submodule("scene.character.runtime").there(rig).dna
     assert len(read.parts[0].mesh.positions) == 506

@@ -16,12 +16,14 @@ from ...logic.base.sentences import told
 from ...scene.anyhead import finding, heads, making, points
 from ...scene.base import parts, saved
 from ...scene.base.blender_types import ArmatureObject, MeshObject
-from ...scene.character import build, runtime
+from ...scene.character import build, rig_placement, runtime
 from ...scene.file import shape_key_head
+from ...scene.frame import evaluate
 from .. import words
 from ..background_work import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
 from ..common import explain, proposed_file, system_path
+from ..file import framing
 from ..file.import_operators import import_character
 from ..file.rig_operators import MadeFace, show_made
 from .landmark_operators import OfHead, head_there, hide_lines
@@ -209,7 +211,13 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
     def _show(self, context: Context) -> Result:
         notes = cast("list[str]", self._task.result)
-        done = import_character(self, context, self.filepath, build.BuildOptions(), show=True)
+        done = import_character(self, context, self.filepath, build.BuildOptions())
+        rig, head = parts.active_rig(context), bpy.data.objects.get(self._head)
+        if done == {"FINISHED"} and rig is not None and head is not None:
+            rig_placement.put_clear_of(rig, head)
+            evaluate.bring_up(context, rig)
+            if not bpy.app.background:
+                framing.frame(context, rig)
         for sentence in notes[:5]:
             self.report({"INFO"}, sentence)
         return done
