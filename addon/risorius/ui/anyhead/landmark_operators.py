@@ -276,7 +276,7 @@ class RISORIUS_OT_save_landmarks(_OfLandmarks, Operator, ExportHelper):
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.filepath:
-            self.filepath = proposed_file(head_there(context).name, ".json")
+            self.filepath = proposed_file(head_there(context).name, ".landmarks.json")
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: Context) -> Result:
