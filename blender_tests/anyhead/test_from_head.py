@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make Rig from Head and Conform Face to Head: what is asked, what comes, what stays."""
+"""Make Rig from Head and Conform Face to Head make faces, refuse bad input, and keep the head."""
 
 import bmesh
 import bpy

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions, and doubles of what the package finds on it."""
+"""A head without expressions, and doubles of the package's parts that work on it."""
 
 from types import SimpleNamespace
 

@@ -80,7 +80,7 @@ class RISORIUS_OT_find_landmarks(RunsBeside, OfHead, Operator):
         return self.begin(context, task)
 
     def finish(self, context: Context) -> Result:
-        """Show what was found; what is missing is said by name."""
+        """Show the landmarks, and report missing ones by name."""
         found, error = self._task.result, self._task.error
         if error is not None and not isinstance(error, native.user_errors()):
             raise error

@@ -40,7 +40,7 @@ _STAGES = {
 
 
 class _Makes(RunsBeside, OfHead, ExportHelper):
-    """What both ways from a head to a face share."""
+    """Base of the operators that make a face from a head."""
 
     filename_ext = ".dna"
 
@@ -92,7 +92,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self._show(context)
 
     def _said(self, error: Exception) -> str:
-        """A sentence; those of the head and of the other face name these themselves."""
+        """The sentence of an error. Errors of the package name the head or the template."""
         if isinstance(error, OSError):
             return explain(error.filename or self.filepath, error)
         return words.of_error(error)
@@ -146,7 +146,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         return making.rig_task(head, self._template(context), transfer, wishes)
 
     def _template(self, context: Context) -> making.Template:
-        """Who lends the expressions.
+        """The face with the expressions.
 
         Raises:
             FaceError: there is no such face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Face from Head: which landmarks a head has, which it lacks, and what can be made."""
+"""The panel Face from Head: the landmarks of a head, and buttons that make a face from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST = 5  # missing landmarks with their buttons; the next follow when these ar
 class RISORIUS_PT_head(FacePanel, Panel):
     bl_idname = "RISORIUS_PT_head"
     bl_label = "Face from Head"
-    bl_order = 0  # while a head is selected it is what one works on
+    bl_order = 0  # a selected head comes before the controls of a face
 
     @classmethod
     def poll(cls, context: Context) -> bool:
