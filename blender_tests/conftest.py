@@ -19,7 +19,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 @pytest.fixture(scope="session")
 def installed():
-    """Whether run.py installed a package; else a copy of the tree in the throw-away folder."""
+    """Whether run.py installed a package; otherwise copy the tree into a temporary folder."""
     if os.environ.get("RISORIUS_TEST_INSTALLED"):
         return None
     target = Path(os.environ["RISORIUS_TEST_USER"]) / "extensions" / "user_default" / "risorius"
@@ -31,9 +31,10 @@ def installed():
 
 @pytest.fixture(scope="session", autouse=True)
 def kept_wheels():
-    """Blender takes the wheel's files away with each disabling and unpacks them with the next.
+    """Keep the files of the wheels: Blender deletes them when an extension is disabled and unpacks
+    them again.
 
-    It takes longer than most tests; what test_extension.py says of it is seen in other processes.
+    This takes longer than most tests; test_extension.py tests it in other processes.
     """
     import addon_utils
 
@@ -50,10 +51,11 @@ def kept_wheels():
 
 @pytest.fixture(autouse=True)
 def tracebacks():
-    """What Blender printed of exceptions in our handlers, timers and operators; a test fails of it.
+    """Exceptions that Blender printed from our handlers, timers and operators; a test with one
+    fails.
 
-    Blender prints those and goes on, so that no test would notice. One that plants an exception
-    takes it out of this list.
+    Blender prints them and goes on, so that no test would notice. A test that plants an exception
+    removes it from this list.
     """
     printed = []
 
@@ -93,7 +95,7 @@ def _repository(installed):
     repository = next((r for r in repos if r.module == "user_default"), None)
     if repository is None:
         repository = repos.new(name="User Default", module="user_default")
-    # Set even where it reads so already: setting it is what makes Blender look there.
+    # Set it even if it has this value, because Blender reads the folder when it is set.
     repository.use_custom_directory = True
     repository.custom_directory = str(installed.parent)
     addon_utils.extensions_refresh(ensure_wheels=False)
@@ -116,7 +118,7 @@ def dna_file(tmp_path):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """What a longer run would have done as well."""
+    """List the tests of a longer run."""
     reasons = {report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])}
     for reason in sorted(r.removeprefix("Skipped: ") for r in reasons):
         if reason.startswith("EXTRA NOT RUN"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times of a drag, from the event to the evaluated mesh; by hand, nothing is asserted.
+"""Times of a drag, from the event to the evaluated mesh; a benchmark without assertions.
 
 python drag_timing.py FACE.dna      in an environment with bpy and the risorius wheel
 """
@@ -20,7 +20,7 @@ DRAGS = 100
 
 
 def main(file: str) -> None:
-    """Install the add-on from the tree, load a face, drag vertices of it about."""
+    """Install the add-on from the tree, load a face, and drag its vertices."""
     user = Path(os.environ["BLENDER_USER_RESOURCES"]) / "extensions" / "user_default"
     user.mkdir(parents=True)
     (user / "risorius").symlink_to(PROJECT / "addon" / "risorius")
@@ -60,7 +60,7 @@ def main(file: str) -> None:
 
 
 def surface_vertices(surface, live, mesh):
-    """Vertices that the controls reach most, a hundred of them spread over the mesh."""
+    """A hundred vertices over the mesh with the largest motion by controls."""
     raw = np.array(live.rests, np.float32)
     some = np.linspace(0, surface.vertex_counts[mesh] - 1, 2000).astype(int)
     reach = np.linalg.norm(surface.jacobian(raw, mesh, some), axis=(1, 2))

@@ -141,7 +141,7 @@ class Output:
             os.dup2(target, descriptor)
 
     def news(self):
-        """What was printed since the last call."""
+        """The output since the last call."""
         sys.stdout.flush()
         sys.stderr.flush()
         ctypes.CDLL(None).fflush(None)
@@ -153,7 +153,7 @@ class Output:
 
 
 def memory():
-    """Resident memory in MiB, after what is free was given back."""
+    """Resident memory in MiB, after releasing free memory."""
     gc.collect()
     libc = ctypes.CDLL(None)
     if hasattr(libc, "malloc_trim"):
@@ -193,7 +193,7 @@ def prepare(folder):
 
 
 class Run:
-    """The actions of one child, and what was seen."""
+    """The actions of one child process and its results."""
 
     def __init__(self, options, world, output):
         self.options, self.world, self.output = options, world, output
@@ -245,7 +245,7 @@ class Run:
         self.samples["all left"].append(sum(counts.values()))
 
     def judge(self):
-        """Sentences on growth; too much of it is an error."""
+        """Sentences about growth; too much growth is an error."""
         found = []
         for name, row in self.samples.items():
             if name == "at action" or len(row) < 8:
@@ -257,7 +257,7 @@ class Run:
         return found
 
     def result(self):
-        """What the parent reads."""
+        """The result for the parent process."""
         import bpy
 
         return {
@@ -318,7 +318,7 @@ def child(options):
 
 
 def main():
-    """Parent, or child where the parent says so."""
+    """Run as the parent, or as a child started by the parent."""
     given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
     options = arguments(given)
     return child(options) if options.child is not None else parent(options)

@@ -116,7 +116,7 @@ def _window_properties() -> dict[str, object]:
         "risorius_stars": bpy.props.BoolProperty(
             name="Stars",
             translation_context=tables.CONTEXT,
-            description="Show a star beside each control: those with one are favourites",
+            description="Show a star beside each control to mark favourites",
             options={"SKIP_SAVE"},
         ),
         "risorius_show_timing": timing_overlay.show_property(),

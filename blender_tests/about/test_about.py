@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The self-test, the list of what a face is made of, and reactions in every mode."""
+"""The self-test, the list of a face's contents, and reactions in every mode."""
 
 import bpy
 import numpy as np

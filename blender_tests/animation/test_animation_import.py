@@ -57,7 +57,7 @@ def _table(tmp_path):
 
 
 def test_what_an_import_leaves_as_it_was_is_named_and_can_be_brought_to_rest(rig, tmp_path, capfd):
-    """A layer says nothing: it lies above the pose."""
+    """Importing as a layer reports nothing, because a layer lies above the pose."""
 
     def bring(**options):
         scene.set_controls(rig, browDownL=0.38, mouthCornerPullL=0.2, jawOpen=0.6)
@@ -132,7 +132,7 @@ def test_a_clip_for_another_thing_is_refused(rig):
 
 
 def test_a_minute_of_a_whole_face_has_all_its_keys(tmp_path):
-    """260 controls at 60 fps: what a capture brings."""
+    """260 controls at 60 fps, as in a capture."""
     from support.faces import CONTROLS, small_face
 
     random = np.random.default_rng(3)
@@ -292,7 +292,8 @@ def test_a_capture_lands_on_whole_frames_of_the_scene(rig, capture, fps, fps_bas
         assert np.array_equal(frames, np.rint(frames))
         assert (np.diff(frames) > 0).all()
         assert len(frames) <= 2 * 39
-    # At whole frames it is what the file has there: straight lines between its rows, held outside.
+    # At whole frames the curve equals straight lines between the rows of the file, constant
+    # outside.
     rows = np.array([0, 1, 2, 4, *range(5, 40)])
     jaw = next(c for c in curves if "jawOpen" in c.data_path)
     for frame in range(-1, int(40 / 30 * fps) + 3):
@@ -558,7 +559,7 @@ def test_a_face_speaks_and_is_heard(rig, voice):
 
 
 def _gives_the_face_back(rig, last):
-    """Before and after a voice the face shows what its sliders say."""
+    """Before and after a voice the face follows its sliders."""
     scene.set_controls(rig, mouthCornerPullL=0.6)
     present = scene.submodule("scene.see_why.present")
     shown = {}
@@ -586,7 +587,7 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
     ended.run()
     assert type(ended.error).__name__ == "CancelledError"
     assert ended.result is None
-    # Nothing ever comes out of this file; the process that reads it is ended all the same.
+    # This file never delivers data; the reading process must be ended all the same.
     os.mkfifo(tmp_path / "endless.wav")
     stuck = listening.SpeechTask(str(tmp_path / "endless.wav"), WORDS)
     stuck.start()
@@ -597,7 +598,8 @@ def test_speech_beside_blender_is_the_same_and_can_be_cancelled(rig, voice, tmp_
 
 
 def test_speech_needs_nothing_of_what_this_blender_has_loaded(rig, voice, monkeypatch):
-    """A Blender that holds another libpocketsphinx cannot load the recogniser: nor does it."""
+    """A Blender with another libpocketsphinx cannot load the recogniser, so it runs in a process of
+    its own."""
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     monkeypatch.setattr(
         scene.submodule("scene.animation.speech_task"), "has_recogniser", lambda: True

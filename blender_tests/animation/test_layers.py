@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers above the sliders: Blender shows what the Mixer computes, and what its own NLA says."""
+"""Layers above the sliders: Blender shows the values of the Mixer, which equal those of the NLA."""
 
 import bpy
 import numpy as np
@@ -52,7 +52,7 @@ def _wave(rig, **options):
 
 
 def _raw(rig, frame):
-    """What the evaluator gets at a frame: float32[controls]."""
+    """The raw controls of the evaluator at a frame: float32[controls]."""
     bpy.context.scene.frame_set(int(np.floor(frame)), subframe=float(frame % 1))
     live = scene.submodule("scene.character.runtime").of(rig)
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -306,7 +306,7 @@ def test_keys_of_a_weight_go_with_their_layer(rig):
 
 
 def _key_weights(controls, name, *values):
-    """An action with a key for the weight of each layer; nothing plays it."""
+    """An action with a key for the weight of each layer; no object plays it."""
     data = controls.animation_data_create()
     data.action = action = bpy.data.actions.new(name)
     for place, value in enumerate(values):

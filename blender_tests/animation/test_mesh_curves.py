@@ -34,7 +34,7 @@ def add_mesh(points, name="Take"):
 
 
 def performer(path, change=lambda points: points):
-    """An object whose shape keys go through the performance, one key a frame."""
+    """An object whose shape keys repeat the performance, one key a frame."""
     rest = change(wanted(path, 1))
     item = add_mesh(rest)
     item.shape_key_add(name="Basis")

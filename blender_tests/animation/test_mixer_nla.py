@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""risorius.Mixer equals Blender's NLA, frame by frame, wherever NLA can say the same."""
+"""risorius.Mixer equals Blender's NLA, frame by frame, where the NLA has the same setting."""
 
 import bpy
 import numpy as np
@@ -29,7 +29,7 @@ def new_curve(action, path, index=0):
 
 
 def keys(curve, frames, values):
-    """Linear keys, instead of what Blender may have set."""
+    """Replace keys by linear ones."""
     curve.keyframe_points.clear()
     curve.keyframe_points.add(len(frames))
     pairs = np.column_stack([frames, values]).ravel()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a face are seen in Blender's animation editors, which show what is selected alone."""
+"""Keys of a face are visible in Blender's animation editors, which show selected items only."""
 
 import bpy
 import pytest
@@ -42,8 +42,8 @@ def _other_armature():
 
 
 def test_a_key_is_seen_whatever_was_selected_before(rig):
-    """Of a face just imported, with another bone, the head, a body or nothing in hand; outside of
-    pose mode those of head and eyes too, so that a column of keys that is moved is moved whole."""
+    """After an import, with another bone, the head, a body or nothing selected. Outside pose mode
+    keys of head and eyes are visible too, so that moving a column of keys moves all of them."""
     controls, head, body = scene.controls(rig), scene.meshes(rig)[0], _other_armature()
     bpy.ops.risorius.key()
     assert JAW in seen_paths()

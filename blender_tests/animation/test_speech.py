@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A voice's keys: as few as its curves need, and every one where it was asked for."""
+"""Keys of a voice: as few as its curves need, or one on every frame if wanted."""
 
 import bpy
 import numpy as np
@@ -17,7 +17,7 @@ LENGTH = 0.1  # seconds of each sound
 
 
 def heard():
-    """What a voice of 1.3 s says: two words, rest, one more."""
+    """A voice of 1.3 s: two words, a pause, a third word."""
     phones = []
     for i, said in enumerate(SAID):
         name, _, word = said.partition(".")
@@ -82,7 +82,7 @@ def test_a_voice_has_as_few_keys_as_its_curves_need(rig):
 
 
 def test_a_layer_shows_the_voice_at_every_frame(rig):
-    """What mixes, exports and bakes reads curves with handles as it reads straight lines."""
+    """Mixing, export and bake read curves with handles as well as straight lines."""
     wanted = speech.animate(heard(), rate=24.0).curve(JAW)
     bpy.ops.risorius.speak(filepath="bob.wav", target="LAYER", start=11.0, use_sound=False)
     (layer,) = scene.controls(rig).risorius_layers
@@ -96,7 +96,8 @@ def test_a_layer_shows_the_voice_at_every_frame(rig):
 
 
 def test_a_face_speaks_by_its_own_visemes(rig, tmp_path):
-    """Those beside its file; what moves a control that it lacks is another face's."""
+    """Visemes beside its file; a viseme with a control that the face lacks belongs to another
+    face."""
     slider = "CTRL_expressions.eyeLookUpL"  # which no voice of ours moves
     dna = tmp_path / "anna.dna"
     rig["risorius_source"] = str(dna)
@@ -150,7 +151,7 @@ def frame_of(place):
 
 
 def jaw_of(action):
-    """The jaw as a voice has it that says from the begin on what the list says."""
+    """The jaw curve of a new voice with the sounds of the list."""
     said = [*action.risorius_spoken.sounds]
     ends = [sound.begin for sound in said[1:]] + [frame_of(len(SAID))]
     phones = [

@@ -439,7 +439,7 @@ def test_between_baked_frames_lie_straight_lines(dna_file):
 
 
 class _Window:
-    """What a modal operator is given, without a window."""
+    """The window of a modal operator, without Blender's interface."""
 
     def __init__(self, job):
         self.window_manager, self.scene = self, bpy.context.scene

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender evaluates with a frame sees the face of that frame; and how, nobody sees."""
+"""Simulations and other readers see the face of their own frame, without side effects."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,7 @@ def mode(request):
 
 
 def _has_maps_of_the_frame(rig, item):
-    """The material of a simulated mesh, which carries the maps, reads those of each frame."""
+    """The material of a simulated mesh, which carries the maps, reads the maps of each frame."""
     assert "maps" in item
     material, seen = item.data.materials[0], []
     for frame in (1, 4):
@@ -45,7 +45,7 @@ def test_pinned_cloth_is_the_face_of_its_frame(mode, dna_file):
 
 
 def test_a_cache_that_begins_below_0_is_refused(dna_file):
-    """Blender reads the last frame of it there, as soon as a face moved."""
+    """At negative frames Blender reads the last frame of the cache as soon as a face moves."""
     _rig, item = simulations.moving(dna_file, "LIVE")
     modifier = simulations.cloth(item)
     modifier.point_cache.frame_start = -3
@@ -76,7 +76,7 @@ def test_a_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_fil
 
 
 def test_a_baked_simulation_of_geometry_nodes_sees_the_face_of_its_frame(mode, dna_file, tmp_path):
-    """Blender keeps what they are after its handlers, so they never were a frame late."""
+    """Blender caches them after its handlers, so they were never a frame late."""
     _rig, item = simulations.moving(dna_file, mode, far=0.0)
     shown = simulations.film(item)
     wanted = simulations.mean_places(shown)
@@ -112,7 +112,9 @@ def test_alembic_has_the_cloth_of_each_frame(mode, dna_file, tmp_path):
     _rig, item = simulations.moving(dna_file, mode)
     wanted = simulations.film(item)
     simulations.cloth(item)
-    if mode != "KEYS":  # see docs/performance.md: a graph of the exporter's own is told afterwards
+    if (
+        mode != "KEYS"
+    ):  # see docs/measurements/blender.md: a graph of the exporter's own is told afterwards
         assert bpy.ops.risorius.bake_physics() == {"FINISHED"}
     path = str(tmp_path / "face.abc")
     bpy.ops.wm.alembic_export(
@@ -194,7 +196,7 @@ WAYS = (_as_it_is, _by_nla, _by_driver, _by_constraint, _by_body, _by_layer, _by
 
 @pytest.mark.parametrize("way", WAYS)
 def test_the_pose_is_there_when_the_frame_is_evaluated(way, dna_file):
-    """The first handler after the graph sees what is shown in the end."""
+    """The first handler after the evaluation sees the final face."""
     rig, item = simulations.moving(dna_file, "AUTO")
     way(rig)
     seen = []
@@ -276,7 +278,7 @@ def test_nothing_of_it_is_seen(dna_file, tmp_path, capfd):
 
 @pytest.fixture
 def onlooker():
-    """Another add-on that is told of frames: for it faces have their pose in time."""
+    """Another add-on with a frame handler: it needs posed faces."""
 
     def look(*_arguments):
         pass

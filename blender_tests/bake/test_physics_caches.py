@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulations that were baked: of older files, in other processes, between frames."""
+"""Baked simulations: of older files, in other processes, between frames."""
 
 import json
 

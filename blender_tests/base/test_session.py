@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the add-on remembers ends with the event that its entry names."""
+"""Session entries are emptied by the events that they name."""
 
 import ctypes
 import gc
@@ -39,7 +39,7 @@ def _frame():
 
 @pytest.fixture
 def probes():
-    """An entry for each word, with something in it."""
+    """An entry with content for each event."""
     session = _session()
     kept = {word: session.keep(f"probe.{word}", list, (word,)) for word in WORDS}
     yield kept
@@ -144,14 +144,14 @@ def test_registered_again_it_is_as_new(dna_file):
 
 
 class _Holder:
-    """Holds one thing. Attributes: it."""
+    """Holds one value. Attributes: it."""
 
     def __init__(self, it):
         self.it = it
 
 
 def test_blender_counts_one_reference_too_few_to_temporary_data():
-    """Fails in the first Blender that counts well: the bound stays, and this says until where."""
+    """Fails in the first Blender that counts correctly; then update MISCOUNTED_UNTIL."""
     place = scene.submodule("scene.base.stage")
     lender = bpy.data.temp_data()
     lent, control = _Holder(lender.__enter__()), _Holder(object())

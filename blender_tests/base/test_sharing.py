@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Equal faces hold their file and their images once, and none notices what is done to another."""
+"""Equal faces share their file and images, and edits of one do not change another."""
 
 import shutil
 from pathlib import Path
@@ -28,7 +28,7 @@ def _picture(path, seed):
 
 @pytest.fixture
 def textured(tmp_path):
-    """A file whose DNA and images do not pack well."""
+    """A file with DNA data and images that are hard to compress."""
     face = small_face()
     noise = np.random.default_rng(3).integers(32, 127, METADATA, np.uint8)
     face.metadata = {
@@ -53,7 +53,7 @@ def _images(rig):
 
 
 def _pixels(rig, label="Colour"):
-    """What the image of a node shows."""
+    """The pixels of a node's image."""
     image = _images(rig)[label]
     flat = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(flat)

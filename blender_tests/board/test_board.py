@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face board: its bones, what they ask for, who leads, and what switching keeps."""
+"""The face board: bones, values, leading side, and switching."""
 
 import bpy
 import numpy as np
@@ -70,7 +70,7 @@ def put(rig, **places):
 
 
 def raw_by_rows(gui, count=11):
-    """What the rows say, in NumPy: the first that holds of each pair counts."""
+    """The rows of the table in NumPy: the first matching row of each pair counts."""
     raw, done = np.zeros(count), set()
     for control, out, low, high, slope, cut in ROWS:
         value = gui.get(GUI[control], 0.0)
@@ -90,7 +90,7 @@ def lead(rig):
 
 
 def shown(rig):
-    """The pose that the add-on says the face has, by short names."""
+    """The pose of the face according to the add-on, by short names."""
     values = scene.submodule("scene.character.sides").values_of(rig)
     return {name.rpartition(".")[2]: round(v, 5) for name, v in values.items() if v}
 

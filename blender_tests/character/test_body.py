@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face stands where its control armature stands, and that may hang on a body."""
+"""A face follows its control armature, which may hang on a body."""
 
 import itertools
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Levels of detail: by hand for viewport and render, by distance, with the user's own hiding."""
+"""Levels of detail: chosen for viewport and render, chosen by distance, and combined with the
+user's hiding."""
 
 import bpy
 import numpy as np
@@ -100,7 +101,8 @@ def test_the_distance_chooses_with_hysteresis_in_the_viewport(mode, dna_file):
 
 @pytest.mark.parametrize("order", [(1, 2, 3), (3, 2, 1), (2,)])
 def test_renders_take_the_level_of_the_distance_alone(dna_file, tmp_path, order):
-    """Frame 2 lies within the viewport's slack: it must not depend on what came before."""
+    """Frame 2 lies within the viewport's tolerance: in renders it must not depend on earlier
+    frames."""
     rig = _load(dna_file)
     camera = _camera(1.0)
     pictures.small_render(camera)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Raw controls that hold rotations of joints: whatever turns head and neck fills them."""
+"""Raw controls of joint rotations: every rotation of head and neck fills them."""
 
 import bpy
 import numpy as np

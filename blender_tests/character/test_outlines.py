@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Outlines of the control bones: beside the face, hidden without hiding keys, never in a scene."""
+"""Outlines of the control bones: placed beside the face, hidden without hiding keys, never objects
+of a scene."""
 
 import shutil
 
@@ -104,7 +105,7 @@ def rig_name(path):
 
 
 def test_a_copy_that_is_deleted_leaves_the_outlines_to_the_face(rig, tmp_path):
-    """Shift-D shares them, and a save removes what is left of a face that was deleted."""
+    """Shift-D shares them, and a save removes the remains of a deleted face."""
     held = [b.custom_shape for b in scene.controls(rig).pose.bones]
     for item in bpy.context.view_layer.objects:
         item.select_set(True)

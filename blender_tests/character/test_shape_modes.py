@@ -38,7 +38,7 @@ def _same_in_both_modes(rig, atol=2e-6):
 
 
 def _own_key(rig, name="own"):
-    """A key of the user's with everything that a key can bear."""
+    """A shape key of the user with all settings that a key can have."""
     head = _head(rig)
     block = head.shape_key_add(name=name, from_mix=False)
     block.points[3].co.z += 0.02
@@ -202,7 +202,7 @@ def test_a_driven_key_set_by_hand_is_not_stuck(dna_file):
 
 
 def _channel_of(rig, path, name, value):
-    """The oracle's vertices with one channel overridden, minus what Blender shows."""
+    """The oracle's vertices with one channel overridden, minus Blender's vertices."""
     import risorius
     from support import oracle
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's vertices equal NumPy's, for the same controls: nothing of ours is on the other side.
+"""Blender's vertices equal those of an independent NumPy implementation for the same controls.
 
-Pose, morph and skinning of the other side are float64 and written from the format's description
-(tests/python/support/oracle.py, support/oracle.py): all levels, both shape modes, by hand, in
-playback and as a render engine is given them, between frames too.
+The NumPy side computes pose, morph and skinning in float64 from the format's description
+(tests/python/support/oracle.py, support/oracle.py). Compared are all levels, both shape modes,
+edits, playback, frames of a render engine, and subframes.
 """
 
 import importlib.util
@@ -55,7 +55,7 @@ class _Face:
         return {int(m): oracle.vertices(self.dna, int(m), pose) for m in there}
 
     def error(self, shown, raw, lod):
-        """Largest distance between what is shown and what is wanted, over the face's size."""
+        """Largest distance of shown from wanted vertices, relative to the size of the face."""
         wanted = self.wanted(raw, lod)
         assert set(shown) == set(wanted)
         size = max(np.ptp(points, axis=0).max() for points in wanted.values())

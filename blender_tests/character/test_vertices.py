@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender shows equals an independent skinning and morph of the same pose."""
+"""Blender's vertices equal an independent skinning and morph of the same pose."""
 
 import bpy
 import numpy as np

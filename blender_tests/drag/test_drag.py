@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Dragging the face: a vertex goes where it is dragged, within the limits of the sliders."""
+"""Dragging the face: a vertex follows the drag within the limits of the sliders."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def man():
-    """The sample face, which is alike left and right, with the corner of its mouth."""
+    """The sample face with equal sides, and the corner of its mouth."""
     bpy.ops.risorius.add_character()
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     scene.set_controls(rig, mouthCornerPullL=1.0)
@@ -393,7 +393,7 @@ def test_what_lies_under_a_ray(rig):
 
 
 def oracle_place(rig, vertex):
-    """Where a vertex of the face at rest lies."""
+    """Place of a vertex of the face at rest."""
     data = scene.meshes(rig)[HEAD].data
     return np.array(data.vertices[vertex].co)
 
@@ -458,7 +458,7 @@ def test_a_drag_depends_on_its_end_and_not_on_its_way(rig, dna_file):
 
 
 def test_a_dragged_brow_turns_no_eye_and_both_sides_go_alike(man):
-    """Of the sample man, whose halves differ: what moves, seen in the sliders."""
+    """On the sample man, whose sides differ: the moving sliders."""
     rig, corner = man
     stroke = scene.submodule("scene.drag.stroke")
     rest = rest_of(scene.meshes(rig)[HEAD])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exported animation comes back from the file as the same vertices, and nothing is left behind."""
+"""Exported animation re-imports as the same vertices, and the export leaves nothing behind."""
 
 import contextlib
 import csv
@@ -18,7 +18,7 @@ from support.animation import animate
 
 FRAMES = (1, 3, 5, 8, 10)
 ENDINGS = {"GLTF": "glb", "FBX": "fbx", "USD": "usdc", "ALEMBIC": "abc"}
-# Of the head's size, by what each file holds.
+# Tolerance relative to the size of the head, by the content of each format.
 NEAR = {
     "ALEMBIC": 5e-6,  # the vertices themselves: a float32 at 1.6 m is 6e-7 of a head wide
     "GLTF": 2e-5,  # float32 joints at every frame, weights normalised anew, axes turned
@@ -37,7 +37,7 @@ def _film(items, frames=FRAMES):
 
 
 def _is_built(kind):
-    """Whether this Blender has the exporter; where it has not, the face says so."""
+    """Whether this Blender has the exporter; otherwise the operator reports it."""
     switch = {"USD": "usd", "ALEMBIC": "alembic"}.get(kind)
     if switch is None or getattr(bpy.app.build_options, switch):
         return True
@@ -105,7 +105,7 @@ def test_the_file_gives_the_same_vertices(kind, dna_file, tmp_path):
 
 
 def _everywhere(rig):
-    """What an export must not touch."""
+    """State that an export must not change."""
     layer = bpy.context.view_layer
     return (
         scene.counts(),
@@ -252,7 +252,7 @@ def test_controls_as_csv_and_clip(dna_file, tmp_path):
         raw = scene.raw_of(rig, dna_file)
         assert np.float32(row[1]) == raw[0]
         assert np.float32(row[header.index("CTRL_expressions.eyeLookUpL")]) == raw[6]
-        # The head bone stands upright: its own x and y axes are the armature's x and z.
+        # The head bone is upright: its own x and y axes are the armature's x and z.
         turn = scene.controls(rig).pose.bones["head"].rotation_euler.to_quaternion()
         rest = scene.controls(rig).data.bones["head"].matrix_local.to_quaternion()
         ahead = (rest @ turn @ rest.inverted()) @ Vector((0, -1, 0))
@@ -349,7 +349,7 @@ def test_without_room_the_old_file_stays(kind, dna_file, tmp_path, monkeypatch):
 
 @contextlib.contextmanager
 def _no_room(kind, monkeypatch):
-    """No file gets longer than a few bytes: as on a full disk."""
+    """Limit every file to a few bytes, as on a full disk."""
     import resource
     import signal
 

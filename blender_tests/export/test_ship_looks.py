@@ -50,7 +50,7 @@ def _export(kind, folder, **options):
 
 
 def _read(kind, path):
-    """What another program finds in a file."""
+    """Content of a file as read by another program."""
     if importlib.util.find_spec(NEEDS[kind]) is None or bpy.app.binary_path:
         pytest.skip(f"EXTRA NOT RUN: {kind} files read by {NEEDS[kind]}, which is not there")
     if kind == "FBX" and shutil.which("assimp") is None:
@@ -71,7 +71,7 @@ def _outside(kind, found):
 
 
 def _everything():
-    """What an export must leave: datablocks, users of materials, what is shown."""
+    """State that an export must keep: datablocks, users of materials, visibility."""
     kinds = ("objects", "meshes", "scenes", "actions", "shape_keys", "armatures", "images")
     found = {k: sorted(x.name for x in getattr(bpy.data, k)) for k in kinds}
     # Of materials alone: 4.2 counts a copied material twice at its images.
@@ -112,7 +112,7 @@ def test_another_program_finds_colours_names_and_time(kind, tmp_path, capfd):
 
 
 def _is_quiet(captured):
-    """Nothing but the operator's own report, and the one line of an exporter in C."""
+    """Whether only the operator's report and the single line of an exporter in C were printed."""
     lines = [x for x in captured.out.splitlines() if x.strip()]
     assert captured.err == ""
     assert [x for x in lines if not x.startswith("Info: out.")] == []

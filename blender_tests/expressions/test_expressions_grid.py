@@ -75,7 +75,7 @@ def apply(name, **how):
 
 
 def refused(call, **given):
-    """The sentence of an operator that does nothing."""
+    """The sentence of a refusing operator."""
     with pytest.raises(RuntimeError) as error:
         call(**given)
     return str(error.value)
@@ -340,7 +340,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     after = oracle.vertices(dna, 0, risorius.Rig(dna).evaluate(moved))
     still = np.linalg.norm(after - before, axis=1) < 1e-6
     assert 0.3 < still.mean() < 0.7
-    # The face fills the picture: its largest side is 1 / 1.05 of it, seen from the front.
+    # The face fills the picture from the front: its largest side is 1 / 1.05 of it.
     low, high = before.min(axis=0), before.max(axis=0)
     half = 1.05 * (high - low)[[0, 2]].max() / 2
     edge = (before[still, 2].min() - (low + high)[2] / 2) / half  # of what stands still, from -1
@@ -349,7 +349,7 @@ def test_a_picture_shows_the_jaw_where_it_is(lower_jaw):
     assert 40 < row < 110
     assert apart[row + 12 :].max() < 0.02  # a hollow's shade reaches a little further
     assert (apart[: row - 12] > 0.05).mean() > 0.2
-    # What is in sight ends where the oracle's vertices end.
+    # The visible area ends at the oracle's vertices.
     shown = (np.abs(rest - np.linspace(rest[0, 0], rest[-1, 0], 160)[:, None]) > 0.05).any(axis=2)
     columns = np.flatnonzero(shown.any(axis=0))
     wide = (high - low)[0] / (2 * half) * 160

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(not PACKAGE, reason="needs --extension ZIP")
 
 @pytest.fixture(scope="module")
 def home(tmp_path_factory):
-    """The user folder of all steps, and a face beside it."""
+    """The user folder for all steps, and a face beside it."""
     folder = tmp_path_factory.mktemp("user")
     small_face().save(str(folder.parent / "small.dna"))
     return folder

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bad files get one sentence and leave nothing behind; a missing wheel is said in words."""
+"""Bad files get one sentence and leave nothing behind; a missing wheel gets a sentence."""
 
 import builtins
 import io
@@ -267,7 +267,7 @@ def test_add_face_builds_the_sample_once(monkeypatch, tmp_path, dna_file, mode):
 
 
 def test_building_a_sample_ends_where_that_is_asked_for(monkeypatch, tmp_path):
-    """What the status bar shows, and Esc: the task of the operator, without a window."""
+    """The status bar and Esc: the task of the operator, without a window."""
     import risorius_people as sample
 
     operator = scene.submodule("ui.file.import_operators").RISORIUS_OT_add_character

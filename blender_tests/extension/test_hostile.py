@@ -19,7 +19,7 @@ QUICK = {"shape_mode": "LIVE", "use_materials": False}
 
 
 def _one_sentence(text, path):
-    """What is said names the file, in one printable sentence."""
+    """Check that a message names the file in one printable sentence."""
     assert "Traceback" not in text, text
     assert Path(path).name in text, text
     assert text.isprintable(), text
@@ -29,14 +29,15 @@ def _one_sentence(text, path):
 
 
 def _take_out():
-    """Remove what was imported."""
+    """Remove the imported data."""
     build, parts = scene.submodule("scene.character.build"), scene.submodule("scene.base.parts")
     for rig in parts.rigs():
         build.remove(rig)
 
 
 def _offer(path, **options):
-    """Import a file that may be refused; returns whether it was taken, and nothing is left."""
+    """Import a file that may be refused, and check that nothing is left. Returns: whether it was
+    accepted."""
     before = scene.counts()
     try:
         bpy.ops.risorius.import_dna(filepath=str(path), **(options or QUICK))
@@ -60,7 +61,7 @@ def _offer_bytes(folder, name, content, **options):
 
 
 def _resident():
-    """Memory that this process holds, in bytes."""
+    """Resident memory of this process in bytes."""
     gc.collect()
     pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[1]
     return int(pages) * 4096

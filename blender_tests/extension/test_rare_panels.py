@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What panels show in states that other tests do not bring them into, and refusals of operators."""
+"""Panels in states that other tests do not reach, and refusals of operators."""
 
 import bpy
 import pytest

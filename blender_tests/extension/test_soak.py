@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The soak, short; and that it sees what it is there to see: wrong faces, tracebacks, deaths."""
+"""A short soak, and proof that it notices wrong faces, tracebacks and crashes."""
 
 import os
 import sys

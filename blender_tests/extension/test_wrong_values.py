@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Properties of a .blend that hold anything at all: no traceback, and the face goes on."""
+"""Properties of a .blend with arbitrary values: no traceback, and the face keeps working."""
 
 import bpy
 import pytest
@@ -20,7 +20,7 @@ VALUES = {
     "an object": "OBJECT",
     "a text": "TEXT",
 }
-# Who bears it -> names of the property.
+# Owner -> names of its properties.
 PROPERTIES = {
     "rig": """risorius_rig risorius_controls risorius_dna risorius_lod risorius_lod_render
         risorius_lod_by_distance risorius_lod_distances risorius_follow risorius_unit
@@ -45,7 +45,7 @@ PROPERTIES = {
     "risorius_landmark_found",
     "landmark": "risorius_landmark risorius_landmark_found",
 }
-# What would hide all others: each of these has a session for itself.
+# Values that would hide all others get a session of their own.
 ALONE = (
     ("rig", "risorius_controls", "numbers"),
     ("rig", "risorius_controls", "an object"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One line at the top of the tab names the mode that is on, and nothing below it moves."""
+"""One line at the top of the tab names the active mode, and the panels below stay in place."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ from support.heights import lines_of
 from support.layout import Recorder, drawn
 
 JAW = "CTRL_expressions.jawOpen"
-# What turns a mode on, what the banner says, and whether its way back takes an operator of its own.
+# Mode -> call that turns it on, text of the banner, and whether an own operator ends it.
 MODES = {
     "tweak": (lambda: bpy.ops.risorius.tweak(first=1, last=20), "Tweak 1-20"),
     "tweak elsewhere": (

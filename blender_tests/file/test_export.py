@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was imported comes out byte for byte; edits come out as what the scene shows."""
+"""An imported file is exported byte for byte; edits are exported as shown in the scene."""
 
 import os
 from pathlib import Path
@@ -54,7 +54,7 @@ def test_untouched_files_of_every_version(mode, tmp_path):
 
 
 def test_untouched_golden_files(tmp_path):
-    """Files that another writer made; those without a face say so at the import."""
+    """Files of another writer; files without a face are refused at the import."""
     seen = 0
     for source in sorted(GOLDEN.glob("*.dna")):
         try:
@@ -95,7 +95,7 @@ def test_edits_come_back_in_every_convention(tmp_path, conventions):
 
 
 def _only_these_changed(source, out, step):
-    """The file's own numbers: three places differ, by the right distances, all else by no bit."""
+    """In the file three values differ by the right distances, and all others by no bit."""
     old, new = risorius.load(str(source)), risorius.load(str(out))
     one, two = old.meshes[0], new.meshes[0]
     moved = oracle.to_blender(new, (two.positions.astype(float) - one.positions))
@@ -113,7 +113,7 @@ def _only_these_changed(source, out, step):
         assert list(changed) == [vertex]
         by_now = oracle.to_blender(new, delta[1] - delta[0])[vertex]
         np.testing.assert_allclose(by_now, by, atol=step * 1e-3)
-    # With those put back the file is the imported one again.
+    # With these restored the file equals the imported one.
     two.positions = one.positions
     two.blend_shape_targets = one.blend_shape_targets
     assert new.to_bytes(version=f"2.{old.version}") == old.to_bytes(version=f"2.{old.version}")

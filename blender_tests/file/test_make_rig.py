@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make Rig from Shape Keys: a head of any make becomes a face that does what its keys did."""
+"""Make Rig from Shape Keys: a head becomes a face that repeats its keys."""
 
 import importlib.util
 import sys
@@ -69,7 +69,7 @@ def made_face():
 
 
 def shape(item, name):
-    """Where a key alone brings the vertices, without the object's own place."""
+    """Vertices moved by one key alone, without the object's transform."""
     key = item.data.shape_keys.key_blocks[name]
     out = np.empty(3 * len(key.data), np.float32)
     key.data.foreach_get("co", out)

@@ -86,7 +86,7 @@ def _head():
 
 
 def _deaf(monkeypatch):
-    """The paths that are given to a recogniser, which hears nothing."""
+    """The paths given to a fake recogniser."""
     heard = []
 
     class Task:

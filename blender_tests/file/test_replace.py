@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Another file takes a face's place: what is the user's stays, what is gone is listed."""
+"""Replacing the file of a face: the user's additions stay, removed parts are listed."""
 
 import bpy
 import numpy as np
@@ -30,7 +30,7 @@ def _report(name="Small"):
 
 
 def _right(rig, path, seed=5):
-    """Random controls show what the new file asks for, and no driver is broken."""
+    """Random controls give the pose of the new file, and no driver is broken."""
     bone = scene.face(rig)
     random = np.random.default_rng(seed)
     labels = [k for k in bone.keys() if k.startswith(PREFIX)]  # noqa: SIM118
@@ -209,7 +209,7 @@ def test_what_users_add_stays(mode, dna_file, other_file):
 
 
 def test_a_face_with_other_topology(mode, dna_file, tmp_path):
-    """Finer by a half, on the same sphere: everything arrives near where it was."""
+    """A finer mesh on the same sphere: all data arrive near their old places."""
     path = _save(small_face(head_grid=(19, 21)), tmp_path)
     rig = scene.load(dna_file, mode)
     head = _decorate(rig)
@@ -792,7 +792,7 @@ def test_maps_of_materials_follow_names(tmp_path):
 
 
 def test_there_and_back_again_is_where_it_was(dna_file, other_file):
-    """Edits of what both files have outlast a replacement and its reversal."""
+    """Edits of parts of both files survive a replacement and its reversal."""
     rig = scene.load(dna_file, "KEYS")
     head = _decorate(rig)
     _keys(rig)["pull_l"].points[5].co.x += 0.01

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of Shape Keys: what the keys of a head become, said by the user before a rig is made."""
+"""Names of Shape Keys: assignments of the keys of a head by the user, before a rig is made."""
 
 import bpy
 import numpy as np
@@ -14,7 +14,7 @@ PREFIX = "CTRL_expressions."
 
 @pytest.fixture
 def head():
-    """The egg with two keys that nothing knows."""
+    """The egg with two unknown keys."""
     item = egg.egg()
     keys = item.data.shape_keys.key_blocks
     keys["jawOpen"].name, keys["mouthSmileLeft"].name = "Key 7", "Key 8"
@@ -115,7 +115,7 @@ def test_what_is_said_is_undone(head):
 
 
 def test_a_picture_shows_where_a_key_moves_the_head(head):
-    """Whichever way the head looks; and one of the sample man what it becomes."""
+    """For every orientation of the head; a picture of the sample man shows the assignment."""
     _SAY(becomes="jawOpen")
     shown = scene.submodule("scene.shape_keys.pictures")
     head.rotation_euler.z = np.pi / 2

@@ -36,14 +36,15 @@ NEAR = 2e-5  # of vertices, of the head's size: float32 bones
 
 
 def two_necks():
-    """The face with neck poses, whose neck is of two joints; the solver reads the lower one."""
+    """The face with neck poses and a neck of two joints; the solver reads the lower one."""
     dna = neck_face()
     dna.joint_names = ["neck_01", "neck_02", *dna.joint_names[2:]]
     return dna
 
 
 class _Reference:
-    """What the format says of the face at the keys: channels, vertices in the face's own space."""
+    """The face at the keys by the format's description: channels, and vertices in the face's own
+    space."""
 
     def __init__(self, dna, rig):
         self.dna = dna
@@ -169,7 +170,7 @@ def _clips(rig, path, reference, wanted, folder):
     with np.load(out) as found:
         for frame in KEYS:
             np.testing.assert_allclose(found["blend_shapes"][frame - 1], wanted[frame], atol=SAME)
-    # The angles alone say the same.
+    # The angles alone give the same result.
     loaded = risorius.Clip.load(clip)
     angles = [f"{bone}.{way}" for bone in ("neck", "head") for way in ("yaw", "pitch", "roll")]
     loaded.selected([JAW, *angles]).save(clip)

@@ -12,7 +12,7 @@ ROWS, CARDS = 3, 5
 
 
 def cards(joint):
-    """A Mesh of cards beside each other on a joint, each ROWS rows of two vertices."""
+    """A Mesh of cards side by side on a joint, each with ROWS rows of two vertices."""
     points, faces = [], []
     for card in range(CARDS):
         for row in range(ROWS):
@@ -50,7 +50,8 @@ def haired(tmp_path):
 
 
 def points_of(thing):
-    """float64[n, 3] of the curves that renders show, in world space, and each one's first."""
+    """float64[n, 3] points of the rendered curves in world space, and the first point of each
+    curve."""
     thing.hide_viewport = False
     graph = bpy.context.evaluated_depsgraph_get()
     seen = thing.evaluated_get(graph)
@@ -119,7 +120,7 @@ def test_roots_stand_between_the_cards_too(haired):
     roots = points[first] - corners[0, 0, 0]
     across, along = corners[0, 0, 1] - corners[0, 0, 0], corners[0, 1, 0] - corners[0, 0, 0]
     side = np.sort(roots @ across / (across @ across))
-    # Between the picture's hairs as well, where it is clear, strands have its colour.
+    # Strands also have the colour of the picture's transparent places between hairs.
     pictures = {n.image for n in item.data.materials[0].node_tree.nodes if n.type == "TEX_IMAGE"}
     assert [picture.alpha_mode for picture in pictures] == ["CHANNEL_PACKED"]
     # In tufts, each as wide as its card, there are gaps of a quarter between them.
@@ -131,7 +132,7 @@ _DARK = 0.1  # as stored: of a picture of brows
 
 
 def test_strands_of_brows_are_no_black_wires(tmp_path):
-    """They are about as light as the cards whose place they take, and have thin roots."""
+    """They are about as light as the cards that they replace, and have thin roots."""
     dna = small_face()
     looks.set_meshes(dna, {"head_lod0_mesh": dna.meshes[0], "brows_lod0_mesh": cards(0)})
     dna.metadata = {
@@ -163,7 +164,7 @@ RADIUS, PITCH, LOCK, LOCKS = 2.0, 5.0, 6, 5  # mm; strands of a lock, locks of a
 
 @pytest.fixture
 def curly(tmp_path):
-    """As `haired`, and its hair winds; a factory of one, by what the metadata say of it."""
+    """A factory like `haired` with winding hair, from metadata."""
 
     def made(words):
         dna = small_face()

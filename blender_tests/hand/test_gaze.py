@@ -17,7 +17,7 @@ def two_eyed(path, shift=0.0):
     """The small face with a right eye too.
 
     Args:
-        path: where it is saved.
+        path: of the saved file.
         shift: file units by which looking left or right moves an eye's centre aside.
     """
     dna = small_face()
@@ -71,7 +71,7 @@ def eye(rig, side):
     """Centre and direction of an eye in world space, from the bone that the skin hangs on."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bone = seen.pose.bones[f"FACIAL_{side}_Eye"]
-    # What looked along -y at rest.
+    # The direction that was -y at rest.
     turn = bone.matrix.to_3x3() @ bone.bone.matrix_local.to_3x3().inverted()
     world = seen.matrix_world
     return world @ bone.matrix.translation, (
@@ -316,7 +316,7 @@ def test_a_blink_closes_quickly_holds_and_opens_slowly(blinking):
 
 
 def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
-    """The active object, else a selected one, an Empty before others, else the camera."""
+    """The active object, or a selected one (an Empty first), or the camera."""
     operators = scene.submodule("ui.hand.gaze")
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     empty = bpy.data.objects.new("empty", None)

@@ -20,7 +20,7 @@ def rig(dna_file):
 
 @pytest.fixture
 def auto():
-    """Auto-key is on, at frame 10, and every preference is what Blender ships."""
+    """Auto-key is on at frame 10, with factory preferences."""
     tools, edit = bpy.context.scene.tool_settings, bpy.context.preferences.edit
     names = ("use_auto_keyframe_insert_needed", "use_keyframe_insert_needed")
     names += ("use_keyframe_insert_available", "keyframe_new_interpolation_type")
@@ -97,7 +97,7 @@ def _asset(rig, operator):
     return operator("EXEC_DEFAULT", **place)
 
 
-# What moves controls, with what is called and the sliders that it sets to which values.
+# Operator that moves controls -> call, and resulting slider values.
 HANDS = {
     "risorius.reset": (lambda rig: bpy.ops.risorius.reset(), {LEFT: 0.0, RIGHT: 0.0, JAW: 0.0}),
     "risorius.mirror": (lambda rig: bpy.ops.risorius.mirror(), {LEFT: 0.1, RIGHT: 0.8}),
@@ -130,10 +130,10 @@ HANDS = {
     ),
 }
 
-# What brings the rest of the face to rest.
+# Operators that set the rest of the face to rest.
 WHOLE = [name for name in HANDS if "express" in name or "asset" in name]
 
-# What moves no slider and no control bone, or keeps its own keys, by the reason.
+# Reason -> operators that move no slider and no control bone, or handle keys themselves.
 OTHERS = {
     "files, faces and what is shown of them": "add_character add_studio attach_body bake "
     "bake_physics bring_back describe detach_body export_animation export_dna export_web "

@@ -43,7 +43,7 @@ def action_of(rig):
 
 
 def below(rig):
-    """All that the action of the face holds."""
+    """The content of the face's action."""
     if action_of(rig) is None:
         return []
     return [
@@ -65,7 +65,7 @@ def shown(rig, frame=None, name=JAW):
 
 
 def press_i(rig, name=JAW, frame=20):
-    """What I over a slider does, and auto-key after it was moved."""
+    """Press I over a slider; auto-key does the same after a move."""
     scene.controls(rig).keyframe_insert(path_of(name), frame=frame)
     bpy.context.view_layer.update()
 
@@ -298,7 +298,7 @@ def test_a_turn_too_far_for_the_fade_is_told_and_put_back(turning):
 
 
 def test_key_all_and_whole_character_and_keys_in_channels_go_into_the_tweak(turning):
-    """A key without a move holds the tweak as it is there."""
+    """A key without a move stores the current tweak."""
     controls, before = scene.controls(turning), below(turning)
     turn(turning, "head")
     assert bpy.ops.risorius.key() == {"FINISHED"}
@@ -385,7 +385,7 @@ def test_beside_nla_strips_moves_and_keys_go_into_the_tweak(rig):
 
 
 def test_the_range_that_is_proposed_lies_around_the_frame(rig):
-    """All keys of a take are selected after an import: they say nothing."""
+    """All keys of a take are selected after an import, so this selection does not count."""
     proposed = scene.submodule("ui.hand.operators").proposed_range
     points = scene.curves(scene.controls(rig))[0].keyframe_points
     for chosen, wanted in (((1, 15, 40), (8, 32)), ((15, 40), (15, 40)), ((15,), (8, 32))):

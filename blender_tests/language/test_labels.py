@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No word of a panel or a dialog is cut at Blender's own widths; automatic values say so."""
+"""No text of a panel or dialog is cut off at Blender's own widths; automatic values are named."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -123,7 +123,7 @@ def test_the_names_of_all_sliders_can_be_read(rig):
 
 
 def test_all_sections_are_seen_at_once_on_a_laptop(rig, monkeypatch):
-    """1366 x 768: of Blender's first window the 3D view has 688 - 84 pixels for the tab."""
+    """1366 x 768: in Blender's first window the tab has 688 - 84 pixels in the 3D view."""
     face, panel = scene.face(rig), ui("face.controls_panel")
     labels = [*STANDARD.read_text().split(), "spine_04.qx"]
     for name in labels:

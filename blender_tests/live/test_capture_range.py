@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The capture range of a face: learned, edited, kept with it, and what captures look like by it."""
+"""The capture range of a face: learned, edited, stored with it, and applied to captures."""
 
 import bpy
 import numpy as np
@@ -30,7 +30,8 @@ def table(path, **curves):
 
 @pytest.fixture(scope="module")
 def rom(tmp_path_factory):
-    """Jaw to 0.8 and smiles to 0.7, of a face whose smile at rest is 0.05; a brow hardly moves."""
+    """A range of motion: jaw to 0.8, smiles to 0.7 with 0.05 at rest, and a brow that hardly
+    moves."""
     smile = 0.05 + bump(150, 110, 0.65)
     return table(
         tmp_path_factory.mktemp("rom") / "rom.csv",
@@ -161,7 +162,7 @@ def test_live_capture_follows_the_range_and_teaches_it(rig, rom):
     assert jaw.keyframe_points[1].co[1] == 1.0
     with pytest.raises(RuntimeError, match="a take of at least 2 s was expected"):
         bpy.ops.risorius.learn_range_live()
-    # What live capture received, as it came: not stretched by the range of before.
+    # The received values, without the earlier range.
     session, frame = session_of(rig), session_of(rig).recent[-1]
     session.recent.clear()
     for n, height in enumerate(bump(150, 60, 0.65)):

@@ -67,7 +67,7 @@ def session_of(rig):
 
 
 def tick_until(rig, frames):
-    """Let the timer beat until so many faces of the subject have come."""
+    """Run the timer until a number of faces of the subject has arrived."""
     module, ends = scene.submodule("scene.live.capture"), monotonic() + 20.0
     session = session_of(rig)
     while True:
@@ -346,7 +346,7 @@ def jaw_keys(rig):
 
 
 def only_recording(faces):
-    """The one that waits, with so many faces."""
+    """The single waiting recording, with a number of faces."""
     (recording,) = scene.submodule("scene.live.recordings").waiting()
     assert len(recording.take) == faces
     return recording

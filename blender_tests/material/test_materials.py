@@ -25,7 +25,7 @@ def _materials(rig):
 
 
 def _shown(material):
-    """The socket that decides what a surface looks like: its colour, or a film's roughness."""
+    """The socket of a surface's colour, or of a film's roughness."""
     shader = looks.principled(material)
     if shader is not None:
         return shader.inputs["Base Color"]
@@ -50,7 +50,7 @@ def kinds_file(tmp_path):
 
 @pytest.mark.parametrize("kind", ["teeth", "tongue", "gums"])
 def test_what_lies_deep_in_a_mouth_is_dark_without_shadows(tmp_path, kind):
-    """Else molars are a white wall behind the corner of an open mouth."""
+    """Otherwise molars look like a white wall behind the corner of an open mouth."""
     face = small_face()
     mesh = looks.copy_mesh(face.meshes[1], scale=2.0)
     points = mesh.positions.copy()
@@ -87,7 +87,8 @@ def test_no_kind_of_mesh_is_flat(kinds_file, tmp_path, simple):
 
 
 def test_threads_of_cloth_are_gone_where_they_would_be_grains(tmp_path):
-    """Height of the weave, as light: seen from 30 cm, even from 3 m, where one is below a pixel."""
+    """Height of the weave as light: visible from 30 cm, even from 3 m, where a thread is below a
+    pixel."""
     face = small_face()
     skin = face.meshes[0]
     shirt = looks.copy_mesh(skin)
@@ -130,7 +131,7 @@ def test_skin_scatters_by_the_size_of_the_head(tmp_path):
 
 
 def _mapped(label, metadata=None):
-    """A face whose second map bears this name; only browDownL moves it, by half, and no bone."""
+    """A face whose second map has this name; browDownL alone moves it, by half, and no bone."""
     center = np.array([0.0, 158.0, 2.0])
     head = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())
     face = looks.set_meshes(small_face(), {"head_lod0_mesh": head})
@@ -228,7 +229,7 @@ def test_wrinkle_textures_show_where_their_mask_is(tmp_path, target, wrinkle):
 
 @pytest.mark.parametrize("target", ["normal", "color"])
 def test_differences_of_nothing_change_nothing(tmp_path, target):
-    """Newer exports hold differences about 0.5: grey there is no colour to turn to."""
+    """Newer exports store differences around 0.5, so grey is no target colour."""
     letter = "w" if target == "normal" else "c"
     path = _save(tmp_path, _mapped(f"head_{letter}m1_{target}.head_wm1_blink_L"))
     _write_maps(tmp_path / "Maps", WHOLE, mask_left=True)
@@ -274,7 +275,7 @@ def test_simple_materials_have_no_drivers_and_no_subsurface(kinds_file):
 
 
 def _eye_under_a_film(film="eyeshell"):
-    """An eye with a film before it, as eyeshell and cornea lie."""
+    """An eye with a film in front of it, like eyeshell and cornea."""
     face = small_face()
     patch = face.meshes[1]
     meshes = {
@@ -318,7 +319,7 @@ def test_a_cornea_refracts_for_cycles_alone(tmp_path):
 
     assert "BSDF_REFRACTION" in shaders(outputs["CYCLES"])
     assert "BSDF_REFRACTION" not in shaders(outputs["ALL"])
-    # Light and shadows pass: what refracts is for rays of the camera.
+    # Light and shadows pass; only camera rays are refracted.
     assert "LIGHT_PATH" in shaders(outputs["CYCLES"])
     assert "BSDF_TRANSPARENT" in shaders(outputs["CYCLES"])
 
@@ -497,13 +498,13 @@ def test_a_configuration_with_other_names_gets_the_right_spaces(tmp_path, data):
     spaces = {w[1]: (w[2], " ".join(w[3:])) for w in map(str.split, said.splitlines())
               if w[:1] == ["SPACE"]}  # fmt: skip
     for name in ("head_normal_map.png", "head_wm1_normal_map.png"):
-        # Blender says `is_data` by the role alone, so without one the name must tell.
+        # Blender sets `is_data` by the role alone, so without a role the name decides.
         assert spaces[name] == (str(data == "Utility - Raw"), "Utility - Raw"), said
     assert spaces["head_color_map.png"] == ("False", "Utility - sRGB - Texture"), said
 
 
 class _Spaces:
-    """The settings of an image in a configuration whose names are none of those that we know."""
+    """The settings of an image in a colour configuration with unknown names."""
 
     bl_rna = SimpleNamespace(
         properties={"name": SimpleNamespace(enum_items=[SimpleNamespace(identifier="Vectors")])}
@@ -575,7 +576,8 @@ def _corner_normals(item):
 
 
 def test_map_drivers_are_plain_sums(tmp_path):
-    """What scene/upkeep/duplicates.py gives to the maps of a duplicate; no Python expression."""
+    """Drivers from scene/upkeep/duplicates.py for the maps of a duplicate: sums without Python
+    expressions."""
     rig = scene.load(_save(tmp_path, _mapped("head_wm2_normal.head_wm2_browsDown_L")))
     drivers = list(scene.submodule("scene.material.materials").map_drivers(_materials(rig)["head"]))
     assert len(drivers) == 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures beside a file: what they unfold to is bounded by what they are, and said before."""
+"""Textures beside a file: their unpacked size is bounded by their file size and checked before."""
 
 import random
 import struct
@@ -51,7 +51,7 @@ def test_damaged_heads_have_a_size_or_none(file_format, tmp_path):
 
 
 def _bomb(width, height, rows=40):
-    """A PNG whose head promises a size."""
+    """A PNG whose header states a size."""
 
     def chunk(kind, content):
         crc = zlib.crc32(kind + content)

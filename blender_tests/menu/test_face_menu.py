@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The menu Face of the header: Blender's search finds what it leads to, and nothing else."""
+"""The menu Face of the header: Blender's search finds its entries only."""
 
 from types import SimpleNamespace
 
@@ -60,7 +60,7 @@ class Menus(Recorder):
 
 
 def found():
-    """What the header leads to: paths as the search shows them, and names of operators."""
+    """The entries of the header: paths as shown by the search, and names of operators."""
     layout = Menus()
     draw = scene.submodule("ui.menu.face_menu").draw_header
     assert draw in bpy.types.VIEW3D_MT_editor_menus._dyn_ui_initialize()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""See Why: solo and mute, what moves a vertex, heat maps, correctives; files have none of it."""
+"""See Why: solo and mute, causes of motion, heat maps, correctives; files contain none of them."""
 
 import bpy
 import numpy as np
@@ -27,7 +27,7 @@ def why(name):
 
 
 def raw_with(rig, path, **values):
-    """float32[R] of the sliders, some of them other ones, by the ends of their names."""
+    """float32[R] of the sliders with some values replaced, by the ends of their names."""
     raw = scene.raw_of(rig, path)
     names = risorius.load(str(path)).raw_control_names
     for end, value in values.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Wrong weights, bones and values show in Direct mode what they show in Live mode."""
+"""Wrong weights, bones and values give the same result in Direct mode and in Live mode."""
 
 import bpy
 import numpy as np
@@ -65,7 +65,7 @@ def test_groups_of_no_bone_and_of_a_bone_that_does_not_deform(tmp_path):
 
 @pytest.mark.parametrize("scale", [(0.0, 0.0, 0.0), (1.0, 0.0, 2.0), (1e-9, 1e-9, 1e-9)])
 def test_a_bone_of_no_size(tmp_path, scale):
-    """A joint that nothing moves is given a scale by a script; its matrix has no inverse."""
+    """A script scales an unmoved joint to 0, so that its matrix has no inverse."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.pose.bones["user_joint"].scale = scale
@@ -102,7 +102,7 @@ def test_a_slider_that_is_no_number(tmp_path):
 
 
 def test_an_added_and_a_renamed_bone(tmp_path):
-    """Weights are read for the bones that are there now."""
+    """Weights are read for the current bones."""
     pair = _pair(small_face(), tmp_path)
     for rig in pair.each():
         rig.hide_viewport = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Direct mode shows what Blender's armature modifier shows: two hundred random poses both ways."""
+"""Direct mode equals Blender's armature modifier in two hundred random poses."""
 
 import os
 from pathlib import Path

@@ -33,7 +33,7 @@ def _keys(rig):
 
 
 def _has_live_form(pair):
-    """Bones, keys and modifiers of the face are those of the face in Live mode."""
+    """Check that bones, keys and modifiers equal those of a face in Live mode."""
     assert pair.bones_apart() < 1e-5
     for item in scene.meshes(pair.direct).values():
         assert "risorius_finished" not in item

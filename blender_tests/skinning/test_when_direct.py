@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A mesh that cannot be in Direct mode shows what Live shows, is named, and comes back."""
+"""A mesh that cannot be in Direct mode looks as in Live mode, is named with the reason, and returns
+to Direct mode."""
 
 from contextlib import contextmanager
 
@@ -267,7 +268,7 @@ WHOLE_FACE = [rest_position, other_inheritance, bone_constraint]
 
 @contextmanager
 def _row(change):
-    """A failure says in which row it was: one scene serves all rows, for each is taken back."""
+    """A failure names its row. One scene serves all rows, because each change is undone."""
     try:
         yield
     except AssertionError as error:
@@ -463,7 +464,7 @@ def test_a_mesh_that_is_worked_on_is_live(pair):
 
 
 def _work(rig, mode, named):
-    """Go into a mode with the head mesh and leave it. Args: named  whether the plan tells of it."""
+    """Enter a mode with the head mesh and leave it. Args: named whether the plan names it."""
     head = scene.meshes(rig)[0]
     _mode(head, mode)
     both_ways.settle()

@@ -216,7 +216,7 @@ SCRIPTED = [child_of_a_bone, constraint, driver, clothes]
 
 
 def test_a_script_that_steps_to_the_next_frame_without_an_update(pair):
-    """Without an interface nothing tells of an edit before the frame that it is seen in."""
+    """Without an interface Blender reports an edit only with the next frame."""
     for rig in pair.each():
         bone = scene.face(rig)
         name = next(k for k in bone.keys() if k.endswith("jawOpen"))  # noqa: SIM118

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Camera, three lights and a backdrop around a face: as large as its head, where it stands."""
+"""Camera, three lights and a backdrop around a face, scaled and placed by its head."""
 
 import bpy
 import numpy as np

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One face in Direct mode beside the same in Live mode, where Blender deforms it."""
+"""One face in Direct mode compared with the same face in Live mode, which Blender deforms."""
 
 import bpy
 import numpy as np
@@ -23,9 +23,9 @@ def is_direct(rig, *numbers):
 
 
 def normals(item):
-    """float64[C, 3] of the corners of the mesh that Blender shows; bool[C] which of them count.
+    """float64[C, 3] normals of the corners of the shown mesh; bool[C] corners to compare.
 
-    Where faces of opposite sides meet, as in the teeth of coarse levels, there is no normal.
+    A corner between polygons with opposite normals, as in teeth of coarse levels, has no normal.
     """
     seen = item.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = seen.to_mesh()
@@ -53,7 +53,7 @@ def bones(rig):
 
 
 def settle():
-    """Let Blender evaluate edits, and what the add-on writes after them."""
+    """Let Blender evaluate edits and the add-on's writes after them."""
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()
 
@@ -100,7 +100,7 @@ class Pair:
         return max(float(np.abs(a - b).max()) for a, b in pairs) / size
 
     def bones_apart(self):
-        """The largest difference of posed bones: of elements of their matrices."""
+        """The largest difference of elements of posed bone matrices."""
         return float(np.abs(bones(self.direct) - bones(self.live)).max())
 
     def check(self, near=NEAR):

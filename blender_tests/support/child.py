@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs a few lines in a Blender of their own: for other environments, and for what may crash."""
+"""Run code in a separate Blender: for other environments, and for code that may crash."""
 
 import os
 import sys

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's own animation editors show, and what is done in them."""
+"""Reading and editing in Blender's own animation editors."""
 
 from contextlib import contextmanager
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One step in the life of an installed extension, in a Blender process of its own.
 
-    blender -b --python extension_steps.py -- STEP [ARGUMENTS]
-    python extension_steps.py -- STEP [ARGUMENTS]
+    blender -b --python extension_steps.py -- STEP [ARGUMENTS] python extension_steps.py -- STEP
+    [ARGUMENTS]
 
-Prints what it found as one line of JSON after `RESULT `; an exception ends it with code 1.
+It prints its result as one line of JSON after `RESULT `. An exception gives exit code 1.
 """
 
 import json
@@ -55,8 +55,8 @@ def _manager():
 
 
 def _read_preferences(step):
-    """As a module Blender starts with factory settings; before 4.5 it dies when it shall read the
-    user's, so what is installed is enabled by hand there."""
+    """The module bpy starts with factory settings. Before 4.5 it crashes when it reads the user's
+    settings, so the extension is enabled by hand there."""
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
     elif step in ("use", "add", "disable", "remove"):
@@ -77,7 +77,7 @@ def install(package):
 
 
 def _vertices(item):
-    """What is shown of a mesh."""
+    """The shown vertices of a mesh."""
     graph = bpy.context.evaluated_depsgraph_get()
     return [tuple(v.co) for v in item.evaluated_get(graph).data.vertices]
 
@@ -99,7 +99,7 @@ def use(path):
 
 
 def add(_nothing=""):
-    """Add > Face, where nothing may be fetched and nothing be run that could fetch."""
+    """Add > Face, without network access."""
 
     def forbidden(*_arguments, **_options):
         raise AssertionError("the sample face needs another program")

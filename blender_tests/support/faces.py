@@ -171,8 +171,8 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
     Args:
         dna: a small_face.
-        joints, controls, channels, maps: the new order: old numbers, or names of new ones; what is
-            left out goes, with everything that belongs to it. None changes nothing.
+        joints, controls, channels, maps: the new order: old indices, or names of new items. Omitted
+            items are removed with their data. None: no change.
 
     Returns:
         The same Dna.
@@ -253,7 +253,7 @@ def _renumber_controls(dna, order):
 
 
 def _renumber_joints(dna, order):
-    """Joints that are new hang under the first; those that skin or move something must stay."""
+    """New joints are children of the first one; joints with skin weights or motion must stay."""
     offsets, angles = dna.neutral_joint_translations, dna.neutral_joint_rotations
     parents = dna.joint_parents
     dna.joint_names, where = _order(dna.joint_names, order)
@@ -290,7 +290,7 @@ def other_face(**options):
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
 UP, SIDE = 1, 2  # poses of neck_face
-# What each pose is at: the rotations of neck_01 and head against rest, about their own axes.
+# Rotations of neck_01 and head for each pose, relative to rest, about their own axes.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),
     (0, 0, 0.0871557, 0.9961947, 0, 0, 0.2164396, 0.9762960),
@@ -301,8 +301,9 @@ NECK_POSES = (
 def neck_face(**options):
     """The small face, whose solver repairs the neck when neck and head turn.
 
-    The raw controls of TURNING hold rotations of joints; a solver's poses NECK_POSES drive the
-    channels 4 and 5, and the pose UP with the open jaw a corrective, which drives channel 2.
+    The raw controls of TURNING store rotations of joints. The solver poses NECK_POSES drive
+    channels 4 and 5. The pose UP together with the open jaw fires a corrective, which drives
+    channel 2.
     """
     dna = small_face(**options)
     count = len(CONTROLS)

@@ -10,7 +10,7 @@ _LEAVES += ("operator_menu_enum", "template_list", "prop_enum")
 
 
 class Lines:
-    """Stands in for a UILayout and counts its lines: a row is as high as its highest part."""
+    """A fake UILayout that counts lines: a row is as high as its highest part."""
 
     def __init__(self, beside=False):
         object.__setattr__(self, "_beside", beside)
@@ -29,7 +29,7 @@ class Lines:
         return part
 
     def panel(self, *_arguments, **_options):
-        """Header and body of a section, which is open."""
+        """Header and body of an open section."""
         return self._part(Lines(beside=True)), self._part(Lines())
 
     def __getattr__(self, name):

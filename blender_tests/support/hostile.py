@@ -38,7 +38,7 @@ def broken_on_purpose():
 
 
 def cut_short(content, count):
-    """The first bytes of a file, at lengths from nothing to all but one byte."""
+    """Prefixes of a file, from no byte to all but one."""
     for length in np.unique(np.linspace(0, len(content) - 1, count).astype(int)):
         yield content[:length]
 
@@ -180,7 +180,7 @@ def _matrix(face, value):
     face.joint_groups = groups
 
 
-# name -> what is done to the small face; all of it can be written and parsed
+# name -> change of the small face; every result can be written and parsed
 ODD = {
     "nan everywhere": lambda f: _numbers(f, np.nan),
     "infinite numbers": lambda f: _numbers(f, np.inf),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Stands in for a UILayout: remembers what a panel says, because no window exists here."""
+"""A fake UILayout that records a panel, because tests have no window."""
 
 from operator import attrgetter
 from types import SimpleNamespace
@@ -10,10 +10,10 @@ ICONS = set(bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum
 
 
 class Recorder:
-    """Takes every call that a panel makes, and looks up what Blender would look up.
+    """Accepts every call of a panel and looks up properties and operators as Blender does.
 
-    `labels` has the words that were drawn, those of buttons too, `operators` what the buttons do,
-    `properties` the paths of what can be set.
+    `labels` has the drawn text including buttons, `operators` the operators of buttons,
+    `properties` the paths of editable properties.
     """
 
     def __init__(self, top=None):
@@ -62,7 +62,7 @@ class Recorder:
 
 
 def drawn(panel):
-    """What a panel draws now, as a Recorder."""
+    """Draw a panel into a Recorder."""
     layout = Recorder()
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes the files of the past with any build of the extension, and notes what they play there.
+"""Make the files of the past with any build of the extension, and record their animation.
 
     python blender_tests/support/make_past.py ZIP FOLDER [--record]
 
-Run by a Python with bpy. With --record the files that are in FOLDER already are played by ZIP
-and not made anew: what they play goes to FOLDER/values.npz.
+Run by a Python with bpy. With --record ZIP plays the existing files of FOLDER and writes their
+values to FOLDER/values.npz.
 """
 
 import argparse
@@ -31,7 +31,7 @@ def _start(package):
 
 
 def main():
-    """Make the files, record what they play."""
+    """Make the files and record their animation."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("zip", type=Path)
     parser.add_argument("folder", type=Path)
@@ -40,7 +40,7 @@ def main():
     _start(options.zip)
     from support import past, past_scenes
 
-    # A .blend holds the path it was saved at: one that says nothing of this machine.
+    # A .blend stores its path, so save it at a neutral one.
     work = Path(tempfile.gettempdir()) / "risorius-past"
     shutil.rmtree(work, ignore_errors=True)
     if options.record:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A layout that stands in for a panel's and tells which words Blender would cut.
+"""A fake layout that finds text which Blender would cut off.
 
-It follows Blender's own layouts as far as widths go, at an interface scale of 1 and in Blender's
-font: a column gives each part its width, a row shares it out by what its parts ask for, a split
-goes by its factor, and with use_property_split names stand in the left two fifths.
+It repeats the widths of Blender's layouts at an interface scale of 1 with Blender's font: a column
+gives each part its width, a row divides it by the needs of its parts, a split by its factor, and
+with use_property_split names use the left two fifths.
 """
 
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ _ASKED = 30  # beside its text a button asks a row for as much, a label for next
 _NUMBER = 60  # a number for more
 _NAMES = 0.4
 _VALUE = "0.000"
-# Heights, as they were measured in a window of Blender 4.3, where they are larger than in 5.2.
+# Heights measured in a window of Blender 4.3, where they are larger than in 5.2.
 HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
 # English -> another language, as Blender would look it up: its own build as a module cannot.
 LOCAL = {}
@@ -186,7 +186,7 @@ class Part:
         return max(tall, default=0) if self.kind in ("row", "split") else sum(tall)
 
     def cut(self, width):
-        """The words that are cut where there is so much room, each with what it needs and has."""
+        """The text cut off at a width, each with its needed and available width."""
         found = []
         for child, room in zip(self.children, self._rooms(width), strict=True):
             if isinstance(child, Part):
@@ -215,7 +215,7 @@ def _property(data, name):
 
 
 class Operator:
-    """An operator as its draw() sees it: its properties as they are set, else at their defaults."""
+    """An operator for its draw(): its properties with given or default values."""
 
     def __init__(self, kind, **given):
         self._kind = kind
@@ -234,13 +234,13 @@ class Operator:
         return rule.default_array if getattr(rule, "is_array", False) else rule.default
 
     def draw(self, context):
-        """Let it draw. Returns: what was drawn."""
+        """Call its draw(). Returns: the drawing."""
         self._kind.draw(self, context)
         return self.layout
 
 
 def drawn(kind, context, **given):
-    """What a panel or a list's line draws."""
+    """The drawing of a panel or of a list's line."""
     layout = Part()
     kind.draw(SimpleNamespace(layout=layout, **given), context)
     return layout

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Skinning and morphing in float64, written from the format's description alone.
 
-Nothing of the add-on is used: a Pose goes in, vertices in Blender's axes and metres come out.
+It uses no code of the add-on: it takes a Pose and returns vertices in Blender's axes and metres.
 """
 
 import numpy as np

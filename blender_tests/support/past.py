@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of the past: how they are brought into Blender, and what they play."""
+"""Files of the past: opening them in several ways, and recording their animation."""
 
 import json
 import os
@@ -13,7 +13,7 @@ DATA = Path(__file__).resolve().parents[1] / "data" / "past"
 FRAMES = (1.0, 4.5, 9.0, 14.0, 20.0, 31.0)
 AS_SAVED = "as saved"
 LIVE_AGAIN = "live again"
-# File -> what is done before it plays: the name of an action is one that the face is given.
+# File -> preparation before playing: the name of an action to assign.
 PLAYS = {
     "layers": (AS_SAVED, "Other"),
     "meta": (AS_SAVED,),
@@ -154,7 +154,7 @@ def show(mode):
 
 
 def prepare(play):
-    """What is done with the open file before it plays, as files of the past do: with bones."""
+    """Prepare the open file for playing, with posed bones as in files of the past."""
     show("LIVE")
     if play != AS_SAVED:
         bpy.context.scene["touched"] = True
@@ -174,7 +174,7 @@ def prepare(play):
 
 
 def _choose_slot(item):
-    """Choose the slot of an action where there is none.
+    """Choose the slot of an action without one.
 
     Blender 5.0 does not choose one for an override's action that comes from 4.2.
     """
@@ -184,11 +184,11 @@ def _choose_slot(item):
 
 
 def film(frames=FRAMES, read=None):
-    """What the faces of the open file play: {"face/frame/what": float32[...]}.
+    """Record the faces of the open file: {"face/frame/what": float32[...]}.
 
     Args:
-        frames: what is played, in this order.
-        read: gives what of a face, in a depsgraph; None for its bones, keys, channels and maps.
+        frames: frames to play, in this order.
+        read: reads values of a face in a depsgraph; None: bones, keys, channels and maps.
     """
     found = {}
     for frame in frames:
@@ -228,7 +228,7 @@ def _read(rig, depsgraph):
 
 
 def vertices(rig, depsgraph):
-    """What `film` reads of a face for its looks: the vertices of each mesh, in world space."""
+    """A reader for `film`: the vertices of each mesh in world space."""
     found = {}
     for key in sorted(k for k in rig.keys() if k.startswith("risorius_mesh_")):  # noqa: SIM118
         seen = rig[key].evaluated_get(depsgraph)
@@ -256,13 +256,13 @@ def _numbers(bone):
 
 
 def films(folder, name, work, routes=None):
-    """Plays a file in every way.
+    """Play a file in every way.
 
     Args:
         folder: where the files are.
         name: of one of PLAYS.
         work: a folder to write to.
-        routes: some of ROUTES; None for all that there are for it.
+        routes: some of ROUTES; None: all routes of the file.
 
     Yields:
         "name/route/play" and its film.
@@ -275,7 +275,7 @@ def films(folder, name, work, routes=None):
 
 
 def record(folder):
-    """Write what the files of a folder play to its values.npz; equal films are kept once."""
+    """Write the films of a folder's files to its values.npz; equal films are stored once."""
     index, kept = {}, []
     for name in PLAYS:
         for key, found in films(folder, name, Path(bpy.app.tempdir)):
@@ -290,7 +290,7 @@ def record(folder):
 
 
 def recorded(folder):
-    """What `record` wrote: "name/route/play" -> film."""
+    """Read the result of `record`: "name/route/play" -> film."""
     with np.load(folder / "values.npz") as held:
         films_of = {}
         for key, entry in json.loads(str(held["index"])).items():

@@ -76,7 +76,7 @@ def _key_weight(item, place, keys):
 
 
 def _three_layers(rig):
-    """An action, an expression and idle life; nothing plays on the sliders below them."""
+    """Layers of an action, an expression and idle life over sliders without animation."""
     item, layers_module = scene.controls(rig), scene.submodule("scene.animation.layers")
     item.risorius_layer_rules = False
     wave = _empty_action(item, f"Wave of {rig.name}")
@@ -105,7 +105,7 @@ def layers(dna, _folder):
 
 
 def meta(dna, _folder):
-    """Keys of weights in an action whose strip lies in a meta strip."""
+    """Keys of weights in an action inside a meta strip."""
     item = _three_layers(scene.load(dna, "LIVE"))
     action = _empty_action(item, "In a meta strip")
     _key_weight(item, 1, {1: 0.0, 20: 1.0})
@@ -175,7 +175,7 @@ def _assign(item, action):
 
 
 def shared_action(dna, _folder):
-    """One action that moves two characters, whose layers stand in another order."""
+    """One action for two characters whose layers have different orders."""
     one = _three_layers(scene.load(dna, "LIVE"))
     two = _three_layers(scene.load(dna, "KEYS"))
     two.risorius_layers.move(0, 2)
@@ -212,7 +212,7 @@ def _strips(item):
 
 
 def baked_result(dna, _folder):
-    """A baked face: strips of bones, keys and maps lie above tracks that were silenced."""
+    """A baked face: strips of bones, keys and maps above muted tracks."""
     rig = scene.load(dna, "LIVE")
     item = _three_layers(rig)
     _strips(item)
@@ -234,7 +234,7 @@ def _own_joint(rig):
 
 
 def baked_controls(dna, _folder):
-    """Baked controls: their strip lies above a muted track and one that played alone."""
+    """Baked controls: their strip lies above a muted track and a solo track."""
     item = _three_layers(scene.load(dna, "KEYS"))
     _strips(item)
     item.animation_data.nla_tracks["Low"].is_solo = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A render engine that draws nothing and writes down the vertices that it was given to render."""
+"""A render engine that draws nothing and records the vertices given to it."""
 
 from contextlib import contextmanager
 
@@ -46,7 +46,7 @@ def _vertices(item):
 
 @contextmanager
 def rendering(setup, between=()):
-    """Make a scene render with the probe; gives what it saw, which grows with each render."""
+    """Make a scene render with the probe. Returns: its records, which grow with each render."""
     bpy.utils.register_class(Probe)
     before = setup.render.engine
     Probe.seen = {}

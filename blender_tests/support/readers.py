@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads exported files without Blender: trimesh, Assimp, OpenUSD and Alembic's own library.
 
-readers.py KIND FILE prints one JSON object. Runs in a process of its own: two copies of OpenUSD or
-Alembic in one process, Blender's and the package's, may not agree.
+readers.py KIND FILE prints one JSON object. It runs in a process of its own, because Blender's and
+the package's copies of OpenUSD or Alembic may conflict in one process.
 
     meshes   name -> points [V][3] at rest, material, colors [V][4] where it has a picture
     names    all other things of the file: armatures, bones, shape keys, takes
-    opaque   materials -> whether nothing shines through
-    begin, end   seconds of the animation
-    up, metres   axis, metres in a unit
+    opaque   materials -> whether nothing shines through begin, end   seconds of the animation up,
+    metres   axis, metres in a unit
 """
 
 import base64

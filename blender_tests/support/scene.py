@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Short words for what the tests do to a scene."""
+"""Short functions for edits of a scene in tests."""
 
 import sys
 
@@ -85,7 +85,7 @@ def raw_of(rig, path):
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
     """Largest distance between Blender's vertices and the oracle's, over the mesh's size.
 
-    The face may stand anywhere.
+    The face may be at any place.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))

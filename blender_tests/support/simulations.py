@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face that moves, what is simulated on it, and how it looks from frame to frame."""
+"""A moving face, simulations on it, and recordings of both."""
 
 import bpy
 import numpy as np
@@ -28,7 +28,7 @@ def apart(film, wanted):
 
 
 def moving(dna_file, mode, far=0.2):
-    """A face whose jaw, head and place are keyed; and its head mesh."""
+    """A face with a keyed jaw, head and place, and its head mesh."""
     rig = scene.load(dna_file, mode)
     controls = animate(rig)
     for frame, x in ((1, 0.0), (6, far), (10, far / 2)):
@@ -54,7 +54,7 @@ def cloth(item, pinned=1.0):
 
 
 def mean_places(places):
-    """Frame -> what `trail` shows of vertices that are at these places. Args: places  a film."""
+    """Frame -> the result of `trail` for given vertices. Args: places a film."""
     found, state = {}, None
     for frame in sorted(places):
         state = places[frame] if state is None else (state + places[frame]) / 2
@@ -63,7 +63,7 @@ def mean_places(places):
 
 
 def trail(item):
-    """Geometry nodes whose state goes half the way to what comes in, at each step."""
+    """Simulation nodes whose state moves half the way to the input at each step."""
     tree = bpy.data.node_groups.new("Trail", "GeometryNodeTree")
     for way in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
@@ -99,7 +99,7 @@ def trail(item):
 
 
 def scarf(item, kind):
-    """A sheet that lies on a mesh by a modifier: SURFACE_DEFORM or SHRINKWRAP."""
+    """A sheet attached to a mesh by a modifier: SURFACE_DEFORM or SHRINKWRAP."""
     points = np.array([v.co for v in item.data.vertices]) @ np.array(item.matrix_world)[:3, :3].T
     points += np.array(item.matrix_world)[:3, 3]
     low, high = points.min(axis=0), points.max(axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user may do to faces, one random action at a time, and what must hold after it."""
+"""Random actions of a user on faces, and the conditions after each."""
 
 import hashlib
 import random
@@ -17,11 +17,11 @@ CONTROLS = [c for c in faces.CONTROLS if c.startswith("CTRL") and len(c) < 60]
 
 
 class WrongFaceError(AssertionError):
-    """A face that is not what its controls say, or a driver that does not work."""
+    """A face does not follow its controls, or a driver is invalid."""
 
 
 class World:
-    """Random actions on the open file. Holds no Blender object: all are found anew."""
+    """Random actions on the open file. It holds no Blender object; all are looked up again."""
 
     def __init__(self, folder, seed, characters):
         self.folder, self.seed, self.characters = folder, seed, characters
@@ -266,9 +266,9 @@ class World:
         if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
             objects.remove(controls)
         if rig.override_library:
-            # Blender makes objects anew that an override's collection has lost.
+            # Blender recreates objects that an override's collection has lost.
             root = rig.override_library.hierarchy_root
-            # A copy of an override has the same root, and stands outside of it.
+            # A copy of an override has the same root and lies outside of it.
             whole = isinstance(root, bpy.types.Collection) and rig in root.all_objects[:]
             bpy.data.batch_remove([*objects, root] if whole else objects)
         elif self.random.random() < 0.5:
@@ -364,7 +364,7 @@ class World:
         self._push("loaded")
 
     def revert(self):
-        """Back to what was saved last, whatever was done since."""
+        """Revert to the last saved file."""
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))
         self._settings()
         self._push("reverted")
@@ -421,7 +421,7 @@ class World:
             The largest error, of a mesh's size.
 
         Raises:
-            WrongFaceError: names what is wrong and by how much.
+            WrongFaceError: names the error and its size.
         """
         bad, _ = scene.invalid_drivers()
         if bad:
@@ -433,7 +433,7 @@ class World:
         for rig in rigs:
             error, where = self._error(rig)
             if not error < scene.TOLERANCE and scene.submodule("scene.frame.evaluate").refused(rig):
-                # Blender has locked an override: the panel says so and has a button.
+                # Blender has locked an override; the panel reports it and has a button.
                 self._activate(rig)
                 bpy.ops.risorius.make_override()
                 self.repaired += 1
@@ -477,7 +477,7 @@ class World:
         self.save_and_load()
 
     def leftovers(self):
-        """Datablocks that stay when every character is deleted: none of them may grow in number.
+        """Datablocks left after deleting every character; their number must not grow.
 
         The file is opened again after it.
         """
@@ -502,12 +502,12 @@ class World:
         return counts
 
     def purge_all(self):
-        """Empty collections, and all that nothing uses."""
+        """Remove empty collections and unused data."""
         bpy.data.batch_remove([c for c in bpy.data.collections if not c.all_objects])
         self.purge()
 
 
-# Action -> how often; those that change the file are undo steps.
+# Action -> weight; actions that change the file are undo steps.
 WEIGHTS = {
     "slider": 300, "frame": 130, "key": 60, "undo": 80, "redo": 50, "select": 60, "lod": 50,
     "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,

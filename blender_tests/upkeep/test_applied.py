@@ -45,7 +45,7 @@ OPERATIONS = {
     "origin to the centre of volume": lambda: ORIGIN(type="ORIGIN_CENTER_OF_VOLUME"),
 }
 SELECTIONS = ("controls", "rig", "one mesh", "all")
-# What Blender refuses by itself where the data are of a library.
+# Steps that Blender itself refuses on library data.
 REFUSED_ON_LINKED_DATA = ("apply all", "geometry to origin", "origin to the cursor")
 
 
@@ -73,7 +73,7 @@ def _objects(rig):
 
 
 def _parts(rig):
-    """Everything that Blender's steps write to: numbers by what they are."""
+    """All values that these steps of Blender change, by name."""
     found = {}
     for item in _objects(rig):
         found[item.name, "matrix"] = np.array(item.matrix_basis)

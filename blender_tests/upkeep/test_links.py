@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Linked characters: they stand still as they were saved, and move once overridden."""
+"""Linked characters keep their saved pose, and move when overridden."""
 
 import bpy
 import numpy as np
@@ -23,7 +23,7 @@ def library(dna_file, tmp_path, mode):
 
 
 def _link(path, instance=True):
-    """Link the collection; returns what became active: the instance, or the controls."""
+    """Link the collection. Returns: the new active object, the instance or the controls."""
     bpy.ops.wm.link(
         directory=f"{path}/Collection/", filename="Small", instance_collections=instance
     )
@@ -221,7 +221,7 @@ def test_override_stands_where_the_instance_stood(library, dna_file):
 
 
 def _system_override(path, editable):
-    """What Blender makes by itself: nothing but what was asked for can be written."""
+    """An override made by Blender alone, in which only chosen parts are editable."""
     item = _link(path)
     item.instance_collection.override_hierarchy_create(
         bpy.context.scene, bpy.context.view_layer, reference=item, do_fully_editable=editable
@@ -245,7 +245,7 @@ def test_system_override_is_noticed_and_repaired(library, dna_file):
 
 
 def test_refused_live_key_is_noticed_and_repaired(library, dna_file, mode):
-    """Blender's menu makes armatures editable, and nothing else."""
+    """Blender's menu makes only armatures editable."""
     rig = _system_override(library[0], editable=False)
     for item in (rig, scene.controls(rig)):
         item.override_library.is_system_override = False

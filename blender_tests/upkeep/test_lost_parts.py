@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Parts that were deleted: nothing is raised, the panel says what is missing, undo mends it."""
+"""Deleted parts: no exception, the panel names the missing part, undo restores it."""
 
 import bpy
 import numpy as np

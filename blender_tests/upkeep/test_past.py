@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files that an older Risorius saved play what they played there, bit for bit, and look the same.
+"""Files of an older Risorius play the same values bit for bit and look the same.
 
 Bones and keys are compared in Live mode, whose form these files have; Direct mode shows the same.
 """
@@ -12,7 +12,7 @@ import pytest
 from support import past
 
 NEAR = 1e-5  # of a mesh's size
-# Files whose first face has joints with keys, real shape keys or is an override: never Direct.
+# Files whose first face is never Direct: it has keyed joints or real shape keys, or is an override.
 ORDINARY = ("baked_result", "baked_controls", "overridden_live", "overridden_keys")
 
 MAKERS = sorted(p.name for p in past.DATA.iterdir() if p.is_dir())
@@ -44,7 +44,7 @@ def assert_same(found, wanted, where):
 
 
 def assert_same_in_direct_mode(where):
-    """Play a film again in both modes, and compare what is seen; the mode is Live then."""
+    """Play a film in both modes and compare the vertices; the mode is Live afterwards."""
     name, route, _play = where.split("/")
     may_be = name not in ORDINARY and route not in ("link", "override")
     films = {}

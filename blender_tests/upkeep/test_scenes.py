@@ -34,7 +34,7 @@ def _play(rig, *frames):
 
 @pytest.mark.parametrize("how", ["hide_viewport", "hide_set", "collection", "layer"])
 def test_hidden_controls_still_move_the_face(rig, how):
-    """Blender evaluates what is hidden only where something visible depends on it."""
+    """Blender evaluates hidden objects only if a visible object depends on them."""
     wanted = _play(rig, 10, 1, 5)
     controls = scene.controls(rig)
     if how in ("collection", "layer"):
@@ -65,7 +65,7 @@ def _small_render(setup):
 
 
 def _rendered(rig, folder, setup):
-    """Frame -> what the render shows, read when each frame is written."""
+    """Frame -> values of the render, read when each frame is written."""
     found = {}
     meshes = [m for _, m in sorted(scene.meshes(rig).items())]
 

@@ -17,7 +17,7 @@ def _rigs():
 
 
 def _state():
-    """Character -> vertices of what is shown, at the frame of the scene."""
+    """Character -> shown vertices at the frame of the scene."""
     bpy.context.view_layer.update()
     found = {}
     for rig in _rigs():
@@ -31,7 +31,7 @@ def _activate(rig):
 
 
 def _slide(chance, rig):
-    """Not the jaw: what is keyed and changed without a key is gone at Blender's next look."""
+    """Do not use the jaw: Blender resets keyed values that change without a key."""
     name = chance.choice(("mouthCornerPullL", "mouthCornerPullR", "browDownL", "eyeLookUpL"))
     scene.set_controls(rig, **{name: chance.random()})
 

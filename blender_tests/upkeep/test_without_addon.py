@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A Blender without the add-on shows the last pose, loses nothing, and its edits count later."""
+"""A Blender without the add-on shows the last pose and loses nothing, and its edits take effect
+later."""
 
 import os
 import sys
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 from support import scene
 
-# Runs in a Blender of factory settings: saves what it shows, changes a slider, saves the file.
+# Runs in a Blender with factory settings: records the vertices, changes a slider, saves the file.
 _OTHER = """
 import sys, os
 import bpy, numpy as np
@@ -37,7 +38,7 @@ os._exit(0)
 
 
 def _in_another_blender(blend, folder):
-    """Open and save a file where no add-on is; what was shown there."""
+    """Open and save a file in a Blender without the add-on. Returns: the shown vertices."""
     script, out = folder / "other.py", folder / "shown.npy"
     script.write_text(_OTHER, encoding="utf-8")
     environment = dict(os.environ, BLENDER_USER_RESOURCES=str(folder / "nobody"))

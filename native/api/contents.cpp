@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a face holds: names, joints, meshes and their shapes, as views into it.
+// The contents of a face: names, joints, meshes and their shapes, as views into it.
 #include <span>
 #include <string>
 #include <vector>
@@ -11,7 +11,7 @@ namespace risorius::api {
 
 namespace {
 
-// Joints, channels, maps or meshes by LOD; nothing for the other lists.
+// The LOD mapping of joints, channels, maps or meshes; null for other lists.
 const dna::LodMapping* lods_of(const dna::Definition& d, risorius_list list) {
   switch (list) {
     case RISORIUS_JOINTS:
@@ -53,7 +53,7 @@ risorius_status refuse_index(const char* argument, std::uint32_t found, std::siz
   });
 }
 
-// Nothing and an error where there is none.
+// Null, with an error set, if the mesh does not exist.
 const dna::Mesh* mesh_of(const risorius_face* face, std::uint32_t index) {
   if (face == nullptr) return (void)refuse("face", "a face was expected, found NULL"), nullptr;
   const std::size_t count = face->face->dna.definition.mesh_names.size();
@@ -105,7 +105,7 @@ risorius_status risorius_lod_items(const risorius_face* face, risorius_list list
   if (mapping == nullptr) return api::refuse("list", "a list that LODs differ in was expected");
   const std::uint32_t lods = face->face->rig.lod_count;
   if (lod >= lods) return api::refuse_index("lod", lod, lods);
-  // A list that the file leaves out is empty at every LOD.
+  // A list without an entry for the LOD is empty.
   const bool is_listed = lod < mapping->lods.size() && mapping->lods[lod] < mapping->rows.size();
   const core::Array<std::uint16_t> none;
   const auto& row = is_listed ? mapping->rows[mapping->lods[lod]] : none;

@@ -51,7 +51,7 @@ risorius_status internal() noexcept {
 risorius_status remember(const core::Error& error, std::string_view file) noexcept {
   const risorius_status status = status_of(error.code);
   LastError& last = last_error();
-  // Should this fail, the error that is shown may not point into texts that were half replaced.
+  // If the next step fails, the shown error must not point into partly replaced texts.
   last.shown = {status, core::to_string(error.code), "", "", -1, "There is no memory for words."};
   if (error.offset) last.shown.offset = static_cast<std::int64_t>(*error.offset);
   const bool copied = had_memory([&] {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a function of the C API does with a failure: nothing is thrown, and the thread remembers it.
+// Error handling of the C API: nothing is thrown, and each thread remembers its last error.
 #pragma once
 
 #include <new>
@@ -10,22 +10,23 @@
 
 namespace risorius::api {
 
-/// Remembers an error for this thread. Never throws: where memory is short the words are lost, not
+/// Remembers an error for this thread. Never throws: if memory is short the texts are lost, but not
 /// the status.
-/// In:  file  the path as it was given, or ""
-/// Out: its status
+/// In:  file  the path as the caller gave it, or ""
+/// Out: the error's status
 risorius_status remember(const core::Error& error, std::string_view file = {}) noexcept;
 
-/// The same of a caller's mistake.
-/// In: argument  its name, and what was expected and found
+/// Remembers an invalid argument.
+/// In: argument  its name
+///     message   the expected and the found value
 risorius_status refuse(std::string_view argument, std::string_view message) noexcept;
 
-/// The same of what no function should throw, told by constant words.
+/// Remembers an unexpected exception, with constant texts.
 risorius_status out_of_memory() noexcept;
 risorius_status internal() noexcept;
 
-/// Runs body, which gives a status. What it throws, or the lack of memory, becomes one.
-/// WebAssembly is built without exceptions; there a lack of memory ends the program.
+/// Runs body, which returns a status, and turns an exception or a lack of memory into a status.
+/// WebAssembly is built without exceptions: there a lack of memory ends the program.
 template <class Body>
 risorius_status guarded(const Body& body) noexcept {
 #ifdef __cpp_exceptions
@@ -41,8 +42,8 @@ risorius_status guarded(const Body& body) noexcept {
 #endif
 }
 
-/// Runs body, which copies words.
-/// Out: false where there was no memory for them
+/// Runs body, which copies texts.
+/// Out: false if there was no memory for them
 template <class Body>
 bool had_memory(const Body& body) noexcept {
 #ifdef __cpp_exceptions

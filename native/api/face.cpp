@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Opening a face: what risorius_options asks of the parser and of the compiler.
+// Opens a face with the parser and compiler options of risorius_options.
 #include "api/face.h"
 
 #include <algorithm>
@@ -79,7 +79,7 @@ compile::CompileOptions compile_options(const risorius_options& options) {
   return out;
 }
 
-// The parser passes over LODs that are not there, as the format's own filter does.
+// The parser skips LODs that do not exist, as the format's own filter does; here it is an error.
 Status has_all_lods(const risorius_options& options, const dna::Dna& dna) {
   std::vector<std::uint16_t> asked(options.lods, options.lods + options.lod_count);
   const std::size_t found = dna.descriptor.lod_count;
@@ -109,7 +109,7 @@ Status keep_meshes(const risorius_options& options, dna::Dna& dna) {
   return ok();
 }
 
-// What compile has read is not needed any more.
+// Drops the layers that only compile needs.
 void drop_behavior(dna::Dna& dna) {
   dna.behavior = {};
   dna.machine_learned_behavior = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What stands behind a risorius_face.
+// The implementation of a risorius_face.
 #pragma once
 
 #include <memory>

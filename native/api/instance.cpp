@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One character on the stage: its controls, its level of detail and its pose.
+// One character: its controls, its level of detail and its pose.
 #include "rig/stages/instance.h"
 
 #include <algorithm>
@@ -29,17 +29,18 @@ struct risorius_instance {
 
   std::shared_ptr<const api::Face> face;
   std::vector<float> raw, gui;
-  std::vector<float> from_gui;  // what the table gives; scratch memory of risorius_set
+  std::vector<float> from_gui;  // raw controls from the table; scratch memory of risorius_set
   std::uint32_t lod = 0;
   rig::Workspace work;
-  rig::Pose pose;                        // settled
-  std::optional<rig::Instance> latent;   // with its own pose
-  const rig::Pose* evaluated = nullptr;  // one of the two; before the first evaluation the settled
+  rig::Pose pose;                       // settled
+  std::optional<rig::Instance> latent;  // with a pose of its own
+  // One of the two poses; before the first evaluation the settled one.
+  const rig::Pose* evaluated = nullptr;
 };
 
 namespace {
 
-// The values of a list, or nothing for a list that an instance has no values of.
+// The values of a list, or null if an instance has no values of it.
 const std::vector<float>* values_of(const risorius_instance& instance, risorius_list list) {
   const rig::Pose& pose = instance.evaluated != nullptr ? *instance.evaluated : instance.pose;
   switch (list) {
@@ -58,7 +59,7 @@ const std::vector<float>* values_of(const risorius_instance& instance, risorius_
   }
 }
 
-// Raw controls that the table of GUI controls writes; it leaves the others alone.
+// Sets the raw controls that the table of GUI controls writes, and keeps the others.
 void apply_table(risorius_instance& instance) {
   rig::gui_to_raw(instance.face->rig, instance.gui.data(), instance.from_gui.data());
   for (std::size_t i = 0; i < instance.raw.size(); ++i) {

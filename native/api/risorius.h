@@ -12,23 +12,24 @@
  *       puts(risorius_last_error()->message);
  *     }
  *
- * Face and instance. A face is what a file says, compiled once; it never changes. An instance is
- * one character on the stage: its controls, its level of detail and its pose. Any number of
- * instances share a face.
+ * Face and instance. A face is a DNA file, compiled once; it never changes. An instance is one
+ * character in a scene: its controls, its LOD and its pose. Any number of instances can share a
+ * face.
  *
- * Threads. A face may be used by any number of threads at once, an instance by one at a time. The
- * last error belongs to the thread.
+ * Threads. Any number of threads may use a face at once, one thread at a time an instance. Each
+ * thread has its own last error.
  *
- * Memory. What a function gives as a pointer belongs to the library: of a face until
- * risorius_close, of an instance until risorius_destroy, of the last error until the next call of
- * this thread that fails. An instance keeps what it needs of its face: the two may end in any
- * order. risorius_set and risorius_evaluate take no memory.
+ * Memory. The library owns the memory of every returned pointer: pointers of a face are valid until
+ * risorius_close, of an instance until risorius_destroy, of the last error until the next failed
+ * call of this thread. An instance keeps the compiled data of its face alive, so both may be closed
+ * in any order. risorius_set and risorius_evaluate allocate no memory.
  *
- * Errors. What can fail returns a risorius_status, or NULL or 0; risorius_last_error has the rest.
- * Nothing is thrown. NULL, indices and counts out of range and numbers that are not finite are
- * refused. Outputs are written only by calls that succeed.
+ * Errors. A function that can fail returns a risorius_status, or NULL or 0; risorius_last_error
+ * returns the details. No function throws. NULL, indices and counts out of range, and numbers that
+ * are not finite are refused. Only successful calls write their outputs.
  *
- * Units and axes are those of the file: see risorius_skeleton. LOD 0 is the most detailed.
+ * Units and axes are the units and axes of the file: see risorius_skeleton. LOD 0 is the most
+ * detailed.
  *
  * Arrays of vectors are planar, as in the file: float[3, n] is all x, then all y, then all z.
  */
@@ -48,8 +49,8 @@
 #define RISORIUS_API __attribute__((visibility("default")))
 #endif
 
-/* Counted up with every change that a compiled program would notice: a function or a field that
- * goes, moves or changes its meaning. It is the number in the shared library's name. */
+/* Increases with every change that breaks compiled programs: a function or a field that is removed,
+ * moved or redefined. It is also the number in the shared library's name. */
 #define RISORIUS_ABI 1
 
 #ifdef __cplusplus
@@ -61,72 +62,73 @@ typedef struct risorius_instance risorius_instance;
 
 typedef enum risorius_status {
   RISORIUS_OK = 0,
-  RISORIUS_BAD_ARGUMENT = 1,  /* the program is wrong: NULL, an index, a number */
-  RISORIUS_BAD_FILE = 2,      /* the bytes are no sound DNA file */
-  RISORIUS_NOT_READABLE = 3,  /* the system does not give the file */
-  RISORIUS_TOO_LARGE = 4,     /* the file asks for more than its size allows */
-  RISORIUS_OUT_OF_MEMORY = 5, /* the system has no more */
-  RISORIUS_INTERNAL = 6       /* a mistake of this library */
+  RISORIUS_BAD_ARGUMENT = 1,  /* a fault of the caller: NULL, an index, a number */
+  RISORIUS_BAD_FILE = 2,      /* the bytes are no valid DNA file */
+  RISORIUS_NOT_READABLE = 3,  /* the system cannot read the file */
+  RISORIUS_TOO_LARGE = 4,     /* the file needs more than its size allows */
+  RISORIUS_OUT_OF_MEMORY = 5, /* the system has no more memory */
+  RISORIUS_INTERNAL = 6       /* a fault of this library */
 } risorius_status;
 
 typedef struct risorius_error {
   risorius_status status;
-  const char* code;    /* what it is in one word, e.g. "truncated", "invalid_index" */
-  const char* file;    /* the path as it was given; "" for bytes in memory */
-  const char* field;   /* of the file, e.g. "behavior.joint_groups[3].values", or the argument */
-  int64_t offset;      /* the byte of the file; -1 where it is not known */
-  const char* message; /* one sentence: what was expected, what was found */
+  const char* code;    /* the error in one word, e.g. "truncated", "invalid_index" */
+  const char* file;    /* the given path; "" for bytes in memory */
+  const char* field;   /* in the file, e.g. "behavior.joint_groups[3].values", or the argument */
+  int64_t offset;      /* byte offset in the file; -1 if unknown */
+  const char* message; /* one sentence with the expected and the found value */
 } risorius_error;
 
-/* What a face has numbers or names of; a uint32_t, so that any number can be refused. */
+/* The lists of a face; a uint32_t, so that any other number can be refused. */
 enum {
-  RISORIUS_RAW_CONTROLS = 0, /* what moves the face: mostly 0 rest, 1 full */
-  RISORIUS_GUI_CONTROLS = 1, /* sliders of the rig's panel, which a table turns into raw controls */
+  RISORIUS_RAW_CONTROLS = 0, /* inputs of the face: usually 0 at rest, 1 full */
+  RISORIUS_GUI_CONTROLS = 1, /* sliders of the rig's panel; a table maps them to raw controls */
   RISORIUS_JOINTS = 2,
-  RISORIUS_SHAPES = 3, /* blend shape channels: weights of shapes of the meshes */
+  RISORIUS_SHAPES = 3, /* blend shape channels: weights of the meshes' targets */
   RISORIUS_MAPS = 4,   /* animated maps: weights of wrinkle and colour textures, 0 to 1 */
   RISORIUS_MESHES = 5,
   RISORIUS_LODS = 6 /* levels of detail; they have no names */
 };
 typedef uint32_t risorius_list;
 
-/* What risorius_options can ask for. */
+/* Flags of risorius_options. */
 enum {
-  RISORIUS_GEOMETRY = 1,         /* read the meshes; else they have a name and nothing else */
-  RISORIUS_TARGETS = 2,          /* and the shapes of the meshes; goes with RISORIUS_GEOMETRY */
+  RISORIUS_GEOMETRY = 1,         /* read the meshes; otherwise they only have names */
+  RISORIUS_TARGETS = 2,          /* also read the targets of the meshes; needs RISORIUS_GEOMETRY */
   RISORIUS_WITHOUT_NETWORKS = 4, /* do not read neural networks */
-  RISORIUS_WITHOUT_SOLVERS = 8,  /* do not read solvers of radial basis functions */
-  RISORIUS_QUATERNIONS = 16,     /* rotations as quaternions and not as Euler angles */
-  RISORIUS_FLOAT16 = 32          /* keep the joint matrices in half the memory, 11 bits exact */
+  RISORIUS_WITHOUT_SOLVERS = 8,  /* do not read RBF solvers */
+  RISORIUS_QUATERNIONS = 16,     /* joint rotations as quaternions instead of Euler angles */
+  RISORIUS_FLOAT16 = 32          /* joint matrices as float16: half the memory, 11 exact bits */
 };
 
-/* What to read. All zero, like NULL in place of the struct: every LOD, no geometry. */
+/* The parts of the file to read. All zero, or NULL for the struct: every LOD, no geometry. */
 typedef struct risorius_options {
-  uint32_t flags;            /* RISORIUS_GEOMETRY and those after it */
+  uint32_t flags;            /* RISORIUS_GEOMETRY to RISORIUS_FLOAT16 */
   uint32_t lod_count;        /* 0: all */
-  const uint16_t* lods;      /* uint16[lod_count], each once and in the file; what no kept LOD
-                                uses is gone, and every index
-                                counts in what is left */
-  uint32_t mesh_count;       /* 0: all; else asks for RISORIUS_GEOMETRY */
-  const char* const* meshes; /* names of the meshes whose geometry is kept, UTF-8 */
+  const uint16_t* lods;      /* uint16[lod_count], each LOD once and present in the file; items
+                                that no kept LOD uses are removed, and
+                                all indices refer to the rest */
+  uint32_t mesh_count;       /* 0: all; otherwise needs RISORIUS_GEOMETRY */
+  const char* const* meshes; /* names of the meshes to read, UTF-8 */
 } risorius_options;
 
-/* The joints at rest, and in what the file counts. Without behavior in the file joints have no
- * values, and stride is 9 as ever. */
+/* The joints in the neutral pose, and the units and axes of the file. If the file has no behavior,
+ * joints have no values and stride is 9. */
 typedef struct risorius_skeleton {
   uint32_t joint_count;
-  uint32_t stride;           /* numbers of a joint: 9, or 10 with RISORIUS_QUATERNIONS */
+  uint32_t stride;           /* numbers per joint: 9, or 10 with RISORIUS_QUATERNIONS */
   const uint16_t* parents;   /* uint16[joints]; a root is its own parent */
   const float* neutral;      /* float[joints, stride]: tx ty tz, rx ry rz or qx qy qz qw, sx sy sz,
                                 relative to the parent */
   uint32_t translation_unit; /* 0 centimetres, 1 metres */
   uint32_t rotation_unit;    /* of Euler angles: 0 degrees, 1 radians */
-  uint32_t axes[3];          /* where x, y, z point: 0 left 1 right 2 up 3 down 4 front 5 back */
+  uint32_t axes[3];          /* directions of x, y, z: 0 left 1 right 2 up 3 down 4 front 5 back */
   uint32_t rotation_order;   /* 0 xyz 1 xzy 2 yxz 3 yzx 4 zxy 5 zyx; the first axis turns first */
   int32_t rotation_signs[3]; /* 1 or -1 */
 } risorius_skeleton;
 
-/* A mesh at rest. A corner of a polygon has a position, a texture coordinate and a normal by index.
+/* A mesh in the neutral pose. A corner of a polygon has a position, a texture coordinate and a
+ * normal by index.
  */
 typedef struct risorius_mesh {
   uint32_t vertex_count, uv_count, normal_count, corner_count, polygon_count, target_count;
@@ -138,7 +140,7 @@ typedef struct risorius_mesh {
   const uint32_t* corner_normals;   /* uint32[corners] */
   const uint32_t* polygon_begins;   /* uint32[polygons + 1] into polygon_corners; NULL: none */
   const uint32_t* polygon_corners;  /* the corners of all polygons, back to back */
-  const uint32_t* skin_begins;      /* uint32[vertices + 1] into the two below; NULL: no skin */
+  const uint32_t* skin_begins;      /* uint32[vertices + 1] into the next two; NULL: no skin */
   const float* skin_weights;
   const uint16_t* skin_joints;
 } risorius_mesh;
@@ -153,13 +155,13 @@ typedef struct risorius_target {
 
 /* ---- the library ---- */
 
-/* RISORIUS_ABI of the library that runs: unequal to the header's, it is another library. */
+/* RISORIUS_ABI of the loaded library; a program must not use a library with another number. */
 RISORIUS_API uint32_t risorius_abi(void);
 
 /* Its version, e.g. "0.1.0". */
 RISORIUS_API const char* risorius_version(void);
 
-/* Of the last call of this thread that failed; never NULL. */
+/* Error of the last failed call of this thread; never NULL. */
 RISORIUS_API const risorius_error* risorius_last_error(void);
 
 /* ---- faces ---- */
@@ -167,28 +169,28 @@ RISORIUS_API const risorius_error* risorius_last_error(void);
 /* Reads and compiles a DNA file.
  * In:    path     UTF-8
  *        options  NULL: every LOD, no geometry
- * Out:   face     to be closed with risorius_close
+ * Out:   face     close it with risorius_close
  * Fails: RISORIUS_NOT_READABLE, RISORIUS_BAD_FILE, RISORIUS_TOO_LARGE, RISORIUS_BAD_ARGUMENT (an
- *        option, a LOD or a mesh that is not there) */
+ *        option, a LOD or a mesh does not exist) */
 RISORIUS_API risorius_status risorius_open_file(const char* path, const risorius_options* options,
                                                 risorius_face** face);
 
-/* The same from the bytes of a file, which are not needed afterwards. */
+/* The same from the bytes of a file; the bytes may be freed afterwards. */
 RISORIUS_API risorius_status risorius_open_memory(const void* bytes, size_t size,
                                                   const risorius_options* options,
                                                   risorius_face** face);
 
-/* NULL is no face, and nothing happens. */
+/* NULL has no effect. */
 RISORIUS_API void risorius_close(risorius_face* face);
 
-/* How many there are. 0 and an error for a list that is none. */
+/* Number of items in a list. 0 and an error for an unknown list. */
 RISORIUS_API uint32_t risorius_count(const risorius_face* face, risorius_list list);
 
-/* The name of one, UTF-8 as the file has it. NULL and an error: there is none. */
+/* The name of an item, UTF-8, from the file. NULL and an error: no such item. */
 RISORIUS_API const char* risorius_name(const risorius_face* face, risorius_list list,
                                        uint32_t index);
 
-/* Which joints, shapes, maps or meshes belong to a LOD.
+/* The joints, shapes, maps or meshes of a LOD.
  * Out: items  uint16[count], indices of the list; count */
 RISORIUS_API risorius_status risorius_lod_items(const risorius_face* face, risorius_list list,
                                                 uint32_t lod, const uint16_t** items,
@@ -207,41 +209,38 @@ RISORIUS_API risorius_status risorius_get_target(const risorius_face* face, uint
 
 /* ---- instances ---- */
 
-/* How an instance goes through time. RISORIUS_SETTLED: a pose is a function of the controls alone.
- * RISORIUS_LATENT: networks, solvers and correctives read what comes after them as the evaluation
- * before left it, as in the reference implementation. */
+/* Behaviour of an instance over time. RISORIUS_SETTLED: a pose depends on the controls alone.
+ * RISORIUS_LATENT: networks, solvers and correctives read outputs of later stages from the previous
+ * evaluation, as in the reference implementation. */
 enum { RISORIUS_SETTLED = 0, RISORIUS_LATENT = 1 };
 typedef uint32_t risorius_timing;
 
-/* A face at rest, at LOD 0.
- * Out: instance  to be ended with risorius_destroy */
+/* Creates an instance at rest, at LOD 0.
+ * Out: instance  destroy it with risorius_destroy */
 RISORIUS_API risorius_status risorius_create(const risorius_face* face, risorius_timing timing,
                                              risorius_instance** instance);
 
-/* NULL is no instance, and nothing happens. */
+/* NULL has no effect. */
 RISORIUS_API void risorius_destroy(risorius_instance* instance);
 
 /* Sets controls `first` to `first + count - 1` of RISORIUS_RAW_CONTROLS or RISORIUS_GUI_CONTROLS.
- * GUI controls change the raw controls that their table writes, at once: whichever was set last
- * counts.
- * In:    values  float[count], finite. Raw controls are not clamped: beyond 1 joints follow on.
- * Fails: RISORIUS_BAD_ARGUMENT, and nothing was set */
+ * GUI controls immediately change the raw controls in their table: the last call wins.
+ * In:    values  float[count], finite. Raw controls are not clamped: above 1 joints extrapolate.
+ * Fails: RISORIUS_BAD_ARGUMENT, and nothing is set */
 RISORIUS_API risorius_status risorius_set(risorius_instance* instance, risorius_list list,
                                           uint32_t first, uint32_t count, const float* values);
 
-/* Another level of detail for the evaluations to come. */
+/* Sets the LOD of later evaluations. */
 RISORIUS_API risorius_status risorius_set_lod(risorius_instance* instance, uint32_t lod);
 
-/* The pose of the controls. */
+/* Computes the pose of the controls. */
 RISORIUS_API risorius_status risorius_evaluate(risorius_instance* instance);
 
-/* Values of an instance: its controls as they were set, the others as of the last evaluation.
- * Joints are what is added to neutral, float[joints, stride] (with quaternions their product with
- * neutral); a scale of 0 is no scale. What the LOD does not use is 0.
- * In:  list   RISORIUS_RAW_CONTROLS to RISORIUS_MAPS
- * Out: count  how many floats; may be NULL
- * Returns NULL and an error: no such list. Where there are no numbers it is no error, and the
- * pointer must not be read. */
+/* Values of an instance: controls as set, all others from the last evaluation. Joints are deltas
+ * added to neutral, float[joints, stride] (quaternions: multiplied with neutral); a scale of 0
+ * means no scaling. Items that the LOD does not use are 0. In:  list   RISORIUS_RAW_CONTROLS to
+ * RISORIUS_MAPS Out: count  number of floats; may be NULL Returns NULL and an error: unknown list.
+ * An empty list is no error; do not read the pointer. */
 RISORIUS_API const float* risorius_values(const risorius_instance* instance, risorius_list list,
                                           uint32_t* count);
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The library `meshoptimizer` of its source package on PyPI, of which the simplifier and the codecs are
-# compiled. The source lies in build/third_party (an sdist of ours carries it); if it is not there, pip
+# The library `meshoptimizer` from its source package on PyPI; only the simplifier and the codecs are
+# compiled. The source lies in build/third_party (our sdist contains it); if it is missing, pip
 # fetches it.
 set(version 0.2.30a0)
 set(sha256 36b18b61a95ba992de804b1e91e86be2ba185925e4e2c1481495f8c68a17f5db)
@@ -40,6 +40,6 @@ add_library(meshoptimizer STATIC ${files})
 set_target_properties(meshoptimizer PROPERTIES UNITY_BUILD OFF) # each file has macros of its own
 target_include_directories(meshoptimizer SYSTEM INTERFACE "${PROJECT_SOURCE_DIR}/build/third_party")
 if(NOT MSVC)
-  # As our own code: the same bits everywhere. Its warnings are not ours.
+  # Compile like our own code, for the same bits everywhere, but without our warnings.
   target_compile_options(meshoptimizer PRIVATE -ffp-contract=off -w)
 endif()

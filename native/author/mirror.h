@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which vertex and which expression lie on the other side.
+// Pairs of vertices and of expressions on the two sides of a face.
 #pragma once
 
 #include <cstdint>
@@ -16,9 +16,9 @@ struct Mirror {
   static constexpr std::uint32_t kNone = 0xffffffffu;
 };
 
-/// The mirror of a mesh across the plane x = 0, empty where it has none.
-/// A vertex lies on the other side where one is nearer than 0.0005 of the mesh's size and edges
-/// agree; expressions belong together where they differ by less than 5 % of their length.
+/// The mirror of a mesh across the plane x = 0; empty if the mesh is not symmetric. Two vertices
+/// are a pair if their distance after mirroring is below 0.0005 of the mesh's size and their edges
+/// agree. Two expressions are a pair if they differ by less than 5 % of their length.
 Mirror find_mirror(const Shapes& shapes);
 
 }  // namespace risorius::author

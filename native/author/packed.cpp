@@ -15,9 +15,10 @@ namespace {
 using core::ErrorCode;
 
 constexpr std::size_t kLargestStride = 256;
-constexpr std::uint32_t kMostVertices = 1u << 30;  // steps from one to another have 30 bits
+constexpr std::uint32_t kMostVertices = 1u << 30;  // differences between two corners have 30 bits
 constexpr std::size_t kMostCount = std::size_t{1} << 31;
-// A block of 256 rows takes a byte for each 4 of a row's at least, a triangle takes one.
+// The smallest packed sizes: a byte for 4 bytes of a row in a block of 256 rows; a byte for a
+// triangle.
 constexpr std::size_t kMostRowBytesPerByte = 1024;
 constexpr std::size_t kMostTriangleBytesPerByte = 12;
 
@@ -91,7 +92,7 @@ void take_filter_off(std::uint8_t* rows, const Packing& packing) {
   }
 }
 
-/// The corners as uint32, which is what the library packs. In: rows  of 2 or 4 bytes
+/// The corners as uint32, the input type of the library. In: rows  of 2 or 4 bytes
 std::vector<std::uint32_t> corners_of(std::span<const std::uint8_t> rows, std::size_t stride) {
   std::vector<std::uint32_t> out(rows.size() / stride);
   for (std::size_t i = 0; i < out.size(); ++i) {

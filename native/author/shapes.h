@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a joint rig is made from: a neutral mesh and where each expression moves its vertices.
+// The input of a joint rig: a neutral mesh and the displacements of its vertices in each
+// expression.
 #pragma once
 
 #include <array>
@@ -15,11 +16,11 @@ using Edge = std::array<std::uint32_t, 2>;
 /// A mesh and its expressions. Lengths are in any one unit.
 struct Shapes {
   std::vector<Vector3> neutral;  // [vertices]
-  /// [vertices][expressions][3]: what the expression adds to the vertex where its control is 1.
+  /// [vertices][expressions][3]: displacement of a vertex while the expression's control is 1.
   std::vector<float> displacements;
   std::size_t expressions = 0;
-  std::vector<Edge> edges;  // of the polygons, each once; a mesh may be in pieces
-  /// [vertices] how much a vertex' squared error counts, more than 0; empty: all alike.
+  std::vector<Edge> edges;  // of the polygons, each once; the mesh may have several pieces
+  /// [vertices] weight of a vertex's squared error, more than 0; empty: all alike.
   std::vector<double> importance;
 
   std::size_t vertex_count() const { return neutral.size(); }

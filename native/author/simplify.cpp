@@ -16,7 +16,7 @@ namespace risorius::author {
 namespace {
 
 constexpr std::size_t kMostAttributes = 32;  // meshoptimizer's own limit
-constexpr float kAnyError = 1e6f;            // the number of triangles is what is asked for
+constexpr float kAnyError = 1e6f;            // the target is the number of triangles, not the error
 
 core::Status check(const Surface& surface) {
   using core::ErrorCode;
@@ -53,10 +53,11 @@ core::Status check(const Surface& surface) {
 using Point = std::array<double, 3>;
 
 constexpr int kPasses = 8;
-constexpr double kSliver = 0.06;    // area by the squared longest edge; of equal sides it is 0.43
-constexpr double kBetter = 1.5;     // times as good the worse of two triangles has to become
-constexpr double kAsOneFace = 0.8;  // cosine to the common normal
-constexpr double kGap = 0.04;       // between the diagonals, of the shorter one
+// Area divided by the squared longest edge; an equilateral triangle has 0.43.
+constexpr double kSliver = 0.06;
+constexpr double kBetter = 1.5;     // factor by which the worse of two triangles has to improve
+constexpr double kAsOneFace = 0.8;  // cosine between a triangle's normal and the common one
+constexpr double kGap = 0.04;  // least distance between the diagonals, divided by the shorter one
 
 Point minus(const Point& a, const Point& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Point cross(const Point& a, const Point& b) {
@@ -65,8 +66,8 @@ Point cross(const Point& a, const Point& b) {
 double dot(const Point& a, const Point& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double length(const Point& a) { return std::sqrt(dot(a, a)); }
 
-/// Diagonals of pairs of triangles turned where one of them is a sliver and lies flat beside the
-/// other: no corner moves, and the surface stays where it was.
+/// Turns the common edge of two triangles if one is a sliver and both lie flat. No corner moves,
+/// and the surface keeps its place.
 class Slivers {
  public:
   Slivers(const Surface& surface, std::vector<Triangle>& triangles)
@@ -108,7 +109,8 @@ class Slivers {
   }
 
   bool turn_some() {
-    std::map<Edge, std::vector<Side>> sides;  // by corners: two sides of a seam are no pair
+    // By corners: the two sides of a seam do not share an edge.
+    std::map<Edge, std::vector<Side>> sides;
     std::map<Edge, int> edges;
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       for (std::size_t k = 0; k < 3; ++k) {

@@ -9,6 +9,7 @@
 #include "author/packed.h"
 #include "author/simplify.h"
 #include "bindings/fields.h"
+#include "bindings/teller.h"
 
 namespace risorius::bindings {
 
@@ -48,23 +49,6 @@ author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const
   out.importance.assign(importance.data(), importance.data() + importance.size());
   return out;
 }
-
-/// Told of progress under the GIL; what Python raises there stops the work and is raised again.
-struct Teller {
-  py::object told;
-  std::exception_ptr raised;
-
-  bool operator()(double share) {
-    const py::gil_scoped_acquire held;
-    try {
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      return told.is_none() || !told(share).is(py::bool_(false));
-    } catch (...) {
-      raised = std::current_exception();
-      return false;
-    }
-  }
-};
 
 /// Positions [J, 3] and motions [E, J, 3] of joints that are there, as GivenJoint.
 /// A joint that no expression moves has no motions.

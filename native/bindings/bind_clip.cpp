@@ -78,7 +78,7 @@ void write_clip(const std::filesystem::path& path, const py::bytes& bytes) {
   taken(std::move(written));
 }
 
-// A Reader remembers a block: threads of Python take turns.
+// A Reader caches a block, so that Python threads take turns.
 class ClipFile {
  public:
   ClipFile(const py::object& source, bool recover) {
@@ -136,7 +136,7 @@ class ClipFile {
   std::mutex mutex_;
 };
 
-// The frames of one thread after the other, whichever it is.
+// Serialises the frames of several threads.
 class ClipFileWriter {
   template <class What>
   auto locked(What&& what) {
@@ -219,7 +219,7 @@ void bind_reader(py::module_& m) {
 }  // namespace
 
 void bind_clip(py::module_& m) {
-  // Kept for the life of the process, as the interpreter keeps its own exception types.
+  // Kept for the life of the process, like the interpreter's own exception types.
   clip_error_type = new_error_type(
       "risorius.ClipError",
       "A clip that cannot be read or written.\n\n"
@@ -231,7 +231,7 @@ void bind_clip(py::module_& m) {
         py::arg("block_frames") = clip::kDefaultBlockFrames);
   m.def("write_clip", &write_clip, py::arg("path"), py::arg("bytes"));
   bind_reader(m);
-  py::class_<ClipFileWriter>(m, "ClipFileWriter", "A .rzc file that is being recorded.")
+  py::class_<ClipFileWriter>(m, "ClipFileWriter", "Records a .rzc file.")
       .def(py::init<const std::filesystem::path&, const std::vector<py::object>&, double, double,
                     bool, const Pairs&, std::size_t>(),
            py::arg("path"), py::arg("names"), py::arg("rate"), py::arg("start"),

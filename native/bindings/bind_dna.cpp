@@ -67,7 +67,7 @@ void bind_behavior_structs(py::module_& m) {
       "float32[rows, columns]");
 
   auto channels = value_class<dna::BlendShapeChannels>(m, "BlendShapeChannels",
-                                                       "Which control drives which channel.");
+                                                       "The control of each blend shape channel.");
   numbers(channels, "lods", [](auto& s) -> auto& { return s.lods; });
   numbers(channels, "input_indices", [](auto& s) -> auto& { return s.input_indices; });
   numbers(channels, "output_indices", [](auto& s) -> auto& { return s.output_indices; });

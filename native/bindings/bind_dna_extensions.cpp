@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The layers that versions 2.3 to 2.6 added. Numbers of choices are the format's, as in its table
-// of enumerations.
+// The layers that versions 2.3 to 2.6 added. Enumerations are the format's numbers.
 #include "bindings/fields.h"
 
 namespace risorius::bindings {
@@ -168,8 +167,8 @@ void bind_rbf(py::module_& m) {
   parts(rbf, "solvers", [](auto& s) -> auto& { return s.solvers; });
   parts(rbf, "poses", [](auto& s) -> auto& { return s.poses; });
 
-  auto controls =
-      value_class<dna::RbfPoseControls>(m, "RbfPoseControls", "What a pose reads and writes.");
+  auto controls = value_class<dna::RbfPoseControls>(m, "RbfPoseControls",
+                                                    "The controls that a pose reads and writes.");
   numbers(controls, "input_control_indices",
           [](auto& s) -> auto& { return s.input_control_indices; });
   numbers(controls, "output_control_indices",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dna from and to bytes, files and JSON, and what changes one as a whole.
+// Reads and writes a Dna as bytes, file and JSON, and operations on a whole Dna.
 #include <charconv>
 
 #include "bindings/fields.h"
@@ -20,7 +20,7 @@ namespace {
 using dna::Dna;
 using Bytes = std::vector<std::uint8_t>;
 
-// Runs native work without the interpreter's lock.
+// Runs native work without the interpreter lock.
 template <class F>
 auto unlocked(F f) {
   const py::gil_scoped_release released;
@@ -101,10 +101,9 @@ void bind_writing(DnaClass& c) {
         return to_bytes(serialise(s, version, unknown_layers));
       },
       py::arg("version") = "2.8", py::arg("unknown_layers") = "preserve",
-      "The bytes of a file of this version. What the version cannot hold is a UserWarning by "
-      "layer: "
-      "newer and unknown layers are written all the same (2.1 has no place for them), or with "
-      "unknown_layers='ignore' left out.");
+      "The bytes of a file of this version. A UserWarning for each layer that the version does not "
+      "know: newer and unknown layers are written anyway (2.1 has no place for them), or left out "
+      "with unknown_layers='ignore'.");
   c.def(
       "save",
       [](const Dna& s, const std::filesystem::path& path, const std::string& version,
@@ -113,12 +112,12 @@ void bind_writing(DnaClass& c) {
         unwrap(unlocked([&] { return bytes::write_file_atomically(path, bytes); }));
       },
       py::arg("path"), py::arg("version") = "2.8", py::arg("unknown_layers") = "preserve",
-      "Writes the file; the old one is whole until the new one is.");
+      "Writes the file. The old file stays whole until the new one is.");
   c.def(
       "to_json",
       [](const Dna& s) { return py::str(unwrap(unlocked([&] { return dna::to_json(s); }))); },
       "The whole value as JSON with the format's own field names. Lossless: numbers are the "
-      "shortest that give the same bits back.");
+      "shortest decimals that give the same bits.");
   c.def_static(
       "from_json",
       [](const py::str& text, const dna::Limits& limits) {
@@ -126,10 +125,10 @@ void bind_writing(DnaClass& c) {
         return std::make_shared<Dna>(
             unwrap(unlocked([&] { return dna::from_json(utf8, limits); })));
       },
-      py::arg("text"), py::arg("limits") = dna::Limits{}, "What to_json wrote.");
+      py::arg("text"), py::arg("limits") = dna::Limits{}, "Reads the output of to_json.");
 }
 
-// "1.0" as two halves of 16 bits.
+// "1.0" as two 16-bit halves.
 std::uint32_t layer_version(const std::string& text) {
   std::uint16_t major = 0, minor = 0;
   const char *begin = text.data(), *end = begin + text.size();
@@ -191,7 +190,7 @@ void bind_layers(DnaClass& c) {
       "Ids of the file's layers in its order.");
 }
 
-// A word of the format; "#17", which a property may show, is no place to convert to.
+// A word of the format. "#17", which a property may show for an unknown number, is not accepted.
 template <class Number, std::size_t kCount>
 std::optional<Number> choice_argument(const std::array<const char*, kCount>& words,
                                       const std::optional<std::string>& text, const char* name) {
@@ -248,10 +247,11 @@ void bind_changes(DnaClass& c) {
         unwrap(unlocked([&] { return dna::validate(s, warnings); }));
         return describe(warnings);
       },
-      "The oddities that can be lived with. Raises DnaError for what cannot.");
+      "The oddities that do not prevent using the face. Raises DnaError for an error.");
   c.def(
       "size_in_bytes", [](const Dna& s) { return dna::size_in_bytes(s); },
-      "Bytes of its numbers and texts, as a file has them: what work on it is held against.");
+      "Bytes of its numbers and texts in a file; limits of work on the face are set in proportion "
+      "to it.");
   c.def(
       "filter_lods",
       [](const Dna& s, const py::object& lods) {
@@ -260,17 +260,17 @@ void bind_changes(DnaClass& c) {
             unwrap(unlocked([&] { return dna::filter_lods(s, selection); })));
       },
       py::arg("lods"),
-      "A copy with (max_lod, min_lod) or [lod, ...] only; every index counts in what is left.");
+      "A copy with the LODs (max_lod, min_lod) or [lod, ...] only; all indices are renumbered.");
   c.def("convert", &convert, py::kw_only(), py::arg("axes") = py::none(),
         py::arg("rotation_sequence") = py::none(), py::arg("rotation_signs") = py::none(),
         py::arg("face_winding_order") = py::none(), py::arg("translation_unit") = py::none(),
         py::arg("rotation_unit") = py::none(),
         "A copy in another coordinate system or other units, e.g. axes=('right', 'front', 'up'), "
         "rotation_sequence='xyz', rotation_signs=(1, 1, 1), face_winding_order='ccw', "
-        "translation_unit='m', rotation_unit='radians'; what is not given stays. Raw controls that "
-        "carry a rotation are meant in the new axes. What the format cannot say there is a "
-        "UserWarning. Raises ValueError for values that make no sense, DnaError where the file's "
-        "own do not.");
+        "translation_unit='m', rotation_unit='radians'. Omitted properties stay. Raw controls that "
+        "carry a rotation refer to the new axes afterwards. A UserWarning for each field that the "
+        "format cannot express in the new system. Raises ValueError for invalid arguments, "
+        "DnaError if the file's own system is invalid.");
   c.def("__reduce__", [](const py::object& self) {
     return py::make_tuple(py::module_::import("risorius").attr("load"),
                           py::make_tuple(self.attr("to_bytes")()));
@@ -295,8 +295,8 @@ py::list findings(bytes::Source& source, const dna::Limits& limits) {
 
 void bind_options(py::module_& m) {
   py::class_<dna::Limits>(m, "Limits",
-                          "What a file may ask for at most: bytes of the file, layers in its "
-                          "index, elements of any list, levels of JSON.")
+                          "Upper limits for a file: bytes of the file, layers in its index, "
+                          "elements of one list, levels of JSON.")
       .def(py::init(
                [](std::uint64_t bytes, std::uint32_t layers, std::uint32_t count,
                   std::uint32_t nesting) { return dna::Limits{bytes, layers, count, nesting}; }),

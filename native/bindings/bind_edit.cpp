@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dna -> Dna operations.
+// Operations from Dna to Dna.
 #include "bindings/fields.h"
 #include "dna/convert/lods.h"
 #include "edit/regroup.h"
@@ -43,19 +43,20 @@ void change(py::class_<RegroupReport>& c, const char* name, Change member, const
 
 void bind_report(py::module_& m) {
   py::class_<GroupSizes>(m, "GroupSizes",
-                         "Joint groups, their rows, coefficients stored (zeros too), not zero.")
+                         "Numbers of joint groups, their rows, stored coefficients (zeros "
+                         "included), and coefficients other than 0.")
       .def_readonly("groups", &GroupSizes::groups)
       .def_readonly("rows", &GroupSizes::rows)
       .def_readonly("coefficients", &GroupSizes::coefficients)
       .def_readonly("nonzero", &GroupSizes::nonzero);
   py::class_<LargestChange>(m, "LargestChange",
-                            "The largest difference of one kind; joint is \"\" if there is none.")
+                            "The largest difference of one kind; joint is \"\" if nothing differs.")
       .def_readonly("value", &LargestChange::value)
       .def_property_readonly("joint", [](const LargestChange& s) { return to_python(s.joint); })
       .def_property_readonly("expression",
                              [](const LargestChange& s) { return to_python(s.expression); })
       .def_readonly("lod", &LargestChange::lod);
-  py::class_<RegroupReport> report(m, "RegroupReport", "What regroup did.");
+  py::class_<RegroupReport> report(m, "RegroupReport", "The result of regroup.");
   report.def_readonly("before", &RegroupReport::before)
       .def_readonly("after", &RegroupReport::after)
       .def_readonly("regions", &RegroupReport::regions)
@@ -65,10 +66,12 @@ void bind_report(py::module_& m) {
   using edit::Changes;
   change(report, "translation_mm", &Changes::translation_mm, "Of a joint against its parent.");
   change(report, "rotation_degrees", &Changes::rotation_degrees, "Of a joint against its parent.");
-  change(report, "scale", &Changes::scale, "Of a joint, 1 is its size.");
+  change(report, "scale", &Changes::scale, "Scale of a joint; 1 is its neutral size.");
   change(report, "position_mm", &Changes::position_mm, "Of a joint in the face.");
-  change(report, "expressions", &Changes::expressions, "Raw controls that were tried one by one.");
-  change(report, "combinations", &Changes::combinations, "Random poses that were tried.");
+  change(report, "expressions", &Changes::expressions,
+         "Number of raw controls that were compared one by one.");
+  change(report, "combinations", &Changes::combinations,
+         "Number of random poses that were compared.");
 }
 
 }  // namespace
@@ -81,8 +84,7 @@ void bind_edit(py::module_& m) {
         "(Dna, RegroupReport): see risorius.rigs.edit.regroup.");
   m.def("keep_parts", &keep_parts, py::arg("dna"), py::kw_only(), py::arg("joints"),
         py::arg("correctives"),
-        "A copy with the joints and correctives alone that are True; every index counts in what is "
-        "left.");
+        "A copy with only the joints and correctives that are True; all indices are renumbered.");
 }
 
 }  // namespace risorius::bindings

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files that Python writes and that appear as a whole.
+// Files that Python writes and that appear only when they are complete.
 #include "bindings/numpy_arrays.h"
 #include "bytes/file_write.h"
 #include "bytes/path_text.h"
@@ -9,7 +9,7 @@ namespace risorius::bindings {
 namespace {
 
 [[noreturn]] void throw_os_error(const std::filesystem::path& path, const std::error_code& reason) {
-  // OSError makes the class that is the number's own of these, e.g. PermissionError.
+  // OSError chooses its subclass by the number, e.g. PermissionError.
   const py::tuple about =
       py::make_tuple(reason.default_error_condition().value(),
                      to_python(bytes::write_trouble(reason)), py::str(py::cast(path)));
@@ -17,7 +17,7 @@ namespace {
   throw py::error_already_set();
 }
 
-// The bytes are Python's to write, the rest is as in write_file_atomically.
+// Python writes the content; everything else is as in write_file_atomically.
 class FileReplacement {
  public:
   FileReplacement(const std::filesystem::path& path, bool sweep) : path_(path) {
@@ -56,8 +56,8 @@ class FileReplacement {
 
 void bind_files(py::module_& m) {
   py::class_<FileReplacement>(m, "FileReplacement",
-                              "A new file beside `path`, to be written under the name `temporary` "
-                              "and closed before commit() puts it in the place of `path`.")
+                              "A new file in the folder of `path`. Write it under the name "
+                              "`temporary` and close it before commit() replaces `path` with it.")
       .def(py::init<const std::filesystem::path&, bool>(), py::arg("path"), py::arg("sweep") = true)
       .def_property_readonly("temporary", &FileReplacement::temporary)
       .def("commit", &FileReplacement::commit)
@@ -77,8 +77,8 @@ void bind_files(py::module_& m) {
         return folder;
       },
       py::arg("path"),
-      "Makes a hidden folder beside the file that `path` means, and removes there what "
-      "remove_leftovers does; its own goes so, should this process end before it is removed.");
+      "Makes a hidden folder beside the file that `path` refers to, and calls remove_leftovers "
+      "there. If this process ends early, a later call removes this folder the same way.");
   m.def(
       "put_in_place",
       [](const std::filesystem::path& file, const std::filesystem::path& path) {
@@ -91,16 +91,15 @@ void bind_files(py::module_& m) {
         if (reason) throw_os_error(path, reason);
       },
       py::arg("file"), py::arg("path"),
-      "Brings a whole file to the disk and puts it in the place of the one that `path` means, with "
-      "an old one's rights; both must be of one file system.");
+      "Flushes a complete file to disk and replaces the file that `path` refers to with it, "
+      "keeping the old rights. Both must be on one file system.");
   m.def(
       "remove_leftovers",
       [](const std::filesystem::path& folder) {
         const py::gil_scoped_release release;
         bytes::remove_leftovers(folder);
       },
-      py::arg("folder"),
-      "Removes what processes of this machine that have ended left of files that they wrote.");
+      py::arg("folder"), "Removes unfinished files of processes of this machine that have ended.");
 }
 
 }  // namespace risorius::bindings

@@ -9,7 +9,7 @@ namespace {
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using IndexArray = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 using CurvesPtr = std::shared_ptr<const clip::LayerCurves>;
-// Holds what must not be const for pybind11.
+// Holds an object that pybind11 cannot keep as const.
 struct PyLayerCurves {
   CurvesPtr curves;
 };
@@ -18,7 +18,7 @@ using PartTuple = std::tuple<IndexArray, FloatArray, double, double, double, dou
 // by, of, measure, amount
 using YieldTuple = std::tuple<IndexArray, IndexArray, std::string, float>;
 
-// A mixer has nothing to do with a file: its errors are plain ValueErrors.
+// Errors of a mixer are plain ValueErrors, because no file is involved.
 template <class T>
 T value_or_throw(core::Result<T>&& result) {
   if (!result) throw py::value_error(result.error().describe());
@@ -165,7 +165,7 @@ FloatArray mix(clip::Mixer& mixer, double time, const py::object& base, const py
   return result;
 }
 
-// base: one frame for all times, or one for each.
+// In: base  one frame for all times, or one for each time
 FloatArray mix_batch(clip::Mixer& mixer, const DoubleArray& times, const py::object& base) {
   if (times.ndim() != 1) shape_error("times", "(n,)", times);
   const auto count = static_cast<py::ssize_t>(mixer.control_count());
@@ -198,7 +198,7 @@ bool fire(clip::Mixer& mixer, std::size_t reaction, double time, float strength)
 void bind_mixer(py::module_& m) {
   using namespace py::literals;
   py::class_<PyLayerCurves, std::shared_ptr<PyLayerCurves>>(
-      m, "LayerCurves", "The curves of a layer, made ready for a list of controls.")
+      m, "LayerCurves", "The curves of a layer, prepared for a list of controls.")
       .def(py::init(&make_curves), "controls"_a, "names"_a, "values"_a, "rate"_a, "start"_a,
            "times"_a = py::none(), "mask"_a = py::none())
       .def_property_readonly("frame_count",
@@ -209,7 +209,7 @@ void bind_mixer(py::module_& m) {
             return std::make_pair(c.curves->first_time(), c.curves->last_time());
           },
           "Seconds of the first and of the last frame.");
-  py::class_<clip::Mixer>(m, "MixerCore", "What risorius.Mixer evaluates with.")
+  py::class_<clip::Mixer>(m, "MixerCore", "The native part of risorius.Mixer.")
       .def(py::init(&make_mixer), "controls"_a, "low"_a, "high"_a, "max_fired"_a)
       .def("set_layers", &set_layers, "layers"_a)
       .def("set_reactions", &set_reactions, "reactions"_a)

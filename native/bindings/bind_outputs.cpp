@@ -30,7 +30,7 @@ FloatArray matrix_argument(const py::object& object, const char* name, py::ssize
   return array;
 }
 
-// A caller's array is written in place, or a new one is made.
+// Writes into the caller's array, or makes a new one.
 py::array_t<float> output_argument(const py::object& object, py::ssize_t rows, const float* base) {
   if (object.is_none()) return py::array_t<float>({rows, py::ssize_t{3}});
   const py::array_t<float> out = written_argument(object, "out", rows);
@@ -137,8 +137,8 @@ void bind_morph(py::module_& m) {
 void bind_bone_space(py::module_& m) {
   py::class_<rig::BoneSpace, std::shared_ptr<rig::BoneSpace>>(
       m, "BoneSpace",
-      "Poses of joints to what another program keeps on bones that rest in the neutral pose, in "
-      "axes and units of its own.")
+      "Converts poses of joints to transforms of another program's bones, which rest in the "
+      "neutral pose, in axes and units of its own.")
       .def(py::init(&make_bone_space), py::arg("neutral_rotations"), py::arg("bones"),
            py::kw_only(), py::arg("axes"), py::arg("scale") = 1.0f, py::arg("radians") = 1.0f,
            py::arg("sequence") = std::array<int, 3>{0, 1, 2},

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Surfaces laid onto others.
+#include <exception>
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "bindings/numpy_arrays.h"
+#include "bindings/teller.h"
 #include "register/closest.h"
+#include "register/register.h"
 #include "register/sparse.h"
 
 namespace risorius::bindings {
@@ -105,10 +109,80 @@ void bind_closest(py::module_& m) {
            "coordinates, float64[n] distance from the origin.");
 }
 
+registering::Mesh mesh(const Doubles& points, const Integers& triangles) {
+  return {vectors(points, "points"), corners(triangles)};
+}
+
+std::vector<registering::Pair> pairs_of(const Integers& vertices, const Doubles& points,
+                                        const Doubles& weights) {
+  const std::vector<registering::Vector3> to = vectors(points, "pair_points");
+  if (vertices.size() != static_cast<py::ssize_t>(to.size()) || vertices.size() != weights.size()) {
+    throw py::value_error("pairs: a vertex, a point and a weight of each were expected");
+  }
+  std::vector<registering::Pair> out;
+  for (std::size_t i = 0; i < to.size(); ++i) {
+    out.push_back({static_cast<std::uint32_t>(vertices.data()[i]), to[i], weights.data()[i]});
+  }
+  return out;
+}
+
+py::tuple arrays(const registering::Registered& found) {
+  const auto count = static_cast<py::ssize_t>(found.points.size());
+  Integers triangle(count);
+  Doubles points({count, py::ssize_t{3}}), shares({count, py::ssize_t{3}}), distance(count);
+  py::array_t<bool> trusted(count);
+  for (std::size_t i = 0; i < found.points.size(); ++i) {
+    std::copy(found.points[i].begin(), found.points[i].end(), points.mutable_data() + 3 * i);
+    std::copy(found.shares[i].begin(), found.shares[i].end(), shares.mutable_data() + 3 * i);
+    triangle.mutable_data()[i] = found.triangle[i];
+    distance.mutable_data()[i] = found.distance[i];
+    trusted.mutable_data()[i] = found.trusted[i] != 0;
+  }
+  return py::make_tuple(points, triangle, shares, distance, trusted);
+}
+
+py::tuple register_surface(const Doubles& points, const Integers& triangles,
+                           const Doubles& target_points, const Integers& target_triangles,
+                           const Integers& pair_vertices, const Doubles& pair_points,
+                           const Doubles& pair_weights, const py::object& start,
+                           const registering::RegisterOptions& options, py::object progress) {
+  const registering::Mesh templ = mesh(points, triangles);
+  const registering::Mesh target = mesh(target_points, target_triangles);
+  const auto pairs = pairs_of(pair_vertices, pair_points, pair_weights);
+  std::vector<registering::Vector3> begin;
+  if (!start.is_none()) begin = vectors(start.cast<Doubles>(), "start");
+  Teller teller{std::move(progress), nullptr};
+  auto result = [&] {
+    const py::gil_scoped_release released;
+    return registering::register_surface(templ, target, pairs, begin, options, std::ref(teller));
+  }();
+  if (teller.raised) std::rethrow_exception(teller.raised);
+  return arrays(unwrap_argument(std::move(result)));
+}
+
+void bind_registration(py::module_& m) {
+  using Options = registering::RegisterOptions;
+  py::class_<Options>(m, "RegisterOptions", "See risorius.anyhead.registration.")
+      .def(py::init([](double mm, std::vector<std::uint8_t> trusted,
+                       std::vector<std::uint32_t> mirrored, double symmetry, std::size_t nodes,
+                       double noise, std::size_t threads) {
+             return Options{mm,     std::move(trusted), std::move(mirrored), symmetry, nodes, noise,
+                            threads};
+           }),
+           py::kw_only(), py::arg("mm"), py::arg("trusted"), py::arg("mirrored"),
+           py::arg("symmetry"), py::arg("nodes"), py::arg("noise"), py::arg("threads"));
+  m.def("register_surface", &register_surface, py::arg("points"), py::arg("triangles"),
+        py::arg("target_points"), py::arg("target_triangles"), py::arg("pair_vertices"),
+        py::arg("pair_points"), py::arg("pair_weights"), py::arg("start"), py::arg("options"),
+        py::arg("progress"),
+        "points, triangle, shares, distance, trusted: see risorius.anyhead.registration.");
+}
+
 }  // namespace
 
 void bind_register(py::module_& m) {
   bind_closest(m);
+  bind_registration(m);
   py::class_<SparseCholesky>(m, "SparseCholesky",
                              "The Cholesky factors of a sparse symmetric positive definite matrix.")
       .def(py::init([](const Integers& rows, const Integers& columns, const Doubles& values,

@@ -56,7 +56,7 @@ PoseArrays to_arrays(const rig::Rig& rig, const rig::Pose& pose) {
           copied(pose.controls, {size(pose.controls)})};
 }
 
-// One of two names, or a ValueError.
+// One of two names; raises ValueError for any other.
 bool is_second(const char* name, const std::string& given, const char* first, const char* second) {
   if (given == second) return true;
   if (given == first) return false;
@@ -85,7 +85,8 @@ std::shared_ptr<rig::Rig> make_rig(const dna::Dna& dna, const std::string& preci
   return std::make_shared<rig::Rig>(unwrap(compile::compile(dna, options)));
 }
 
-// Keeps a buffer of Python's; whoever lets go of it last may not hold the interpreter.
+// Keeps a Python buffer alive. The last owner may release it only without holding the interpreter
+// lock.
 std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) {
   auto* held = new py::buffer_info(buffer.request());
   return {address, [held](const void*) {
@@ -94,8 +95,9 @@ std::shared_ptr<const void> keep(const py::buffer& buffer, const void* address) 
           }};
 }
 
-// Nobody can change a bytes object under a Rig. Any other buffer is copied, a read-only view as
-// well: what it shows may be written by its owner. So are bytes that do not lie on 64.
+// A bytes object is immutable and can be used in place. Any other buffer is copied, even a
+// read-only view, because its owner may still write to it. Bytes that are not aligned to 64 are
+// copied too.
 std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
                                          const std::optional<std::string>& simd) {
   const py::buffer_info info = buffer.request();
@@ -118,7 +120,7 @@ std::shared_ptr<rig::Rig> rig_from_bytes(const py::buffer& buffer, bool trusted,
       unwrap(rig::open_rig({data, size}, std::move(owner), check, kernels_argument(simd))));
 }
 
-// A buffer that keeps its Rig.
+// A buffer that keeps its Rig alive.
 py::memoryview block_of(const py::object& self) {
   const auto& block = self.cast<const rig::Rig&>().block();
   py::array_t<std::uint8_t> view({static_cast<py::ssize_t>(block.size())}, {py::ssize_t{1}},
@@ -187,15 +189,15 @@ py::tuple solver_poses(const rig::Rig& rig, std::uint32_t index, const py::objec
   return py::make_tuple(distances, weights);
 }
 
-// Of this thread, for one of the last few Rigs that it evaluated: to make a workspace takes longer
-// than an evaluation, and what it keeps from the frame before makes that shorter.
+// The workspaces of this thread for the last few Rigs that it evaluated: making one takes longer
+// than an evaluation, and a kept workspace makes the next evaluation shorter.
 rig::Workspace& workspace_of(const rig::Rig& rig) {
   struct Kept {
     std::uint64_t rig;
     rig::Workspace work;
   };
   constexpr std::size_t kMost = 8;
-  thread_local std::list<Kept> last;  // the latest first
+  thread_local std::list<Kept> last;  // most recently used first
   auto found = std::ranges::find(last, rig.number, &Kept::rig);
   if (found != last.end()) {
     last.splice(last.begin(), last, found);
@@ -214,7 +216,7 @@ PoseArrays evaluate(const rig::Rig& rig, const py::object& raw, std::uint32_t lo
   const rig::PoseView pose = view_of(out);
   if (settle) {
     rig::evaluate(rig, in.data(), lod, true, workspace_of(rig), pose);
-  } else {  // it reads what the frame before left, and there was none
+  } else {  // it reads the controls of the frame before, which do not exist
     rig::Workspace work = rig::make_workspace(rig);
     rig::evaluate(rig, in.data(), lod, false, work, pose);
   }
@@ -256,32 +258,32 @@ py::list texts(const auto& list) {
   return out;
 }
 
-// A Rig as bytes and as a file, there and back.
+// Conversions of a Rig to and from bytes and files.
 void bind_rig_bytes(RigClass& c) {
   c.def_static("from_bytes", &rig_from_bytes, py::arg("bytes"), py::arg("trusted") = false,
                py::arg("simd") = py::none(),
-               "A Rig from what to_bytes or block gave, of this version and byte order. A "
-               "bytes object whose data lies on a multiple of 64 is used in place and kept, any "
-               "other buffer is copied. trusted leaves out the hash and the check of every index.")
+               "A Rig from the bytes of to_bytes or block, of this version and byte order. A bytes "
+               "object whose data is aligned to 64 is used in place and kept; any other buffer is "
+               "copied. trusted skips the hash and the check of every index.")
       .def(
           "to_bytes",
           [](const rig::Rig& r) {
             return py::bytes(reinterpret_cast<const char*>(r.block().data()), r.block().size());
           },
-          "The compiled face as bytes, a cache for from_bytes.")
+          "The compiled face as bytes, which can be cached for from_bytes.")
       .def("save", &save_rig, py::arg("path"),
-           "Writes to_bytes() to a file, a cache for load; an old file is whole until the new one "
-           "is.")
+           "Writes to_bytes() to a file, as a cache for load. The old file stays whole until the "
+           "new one is.")
       .def_static("load", &load_rig, py::arg("path"), py::arg("trusted") = false,
                   py::arg("simd") = py::none(), py::kw_only(), py::arg("mapped") = false,
                   "A Rig from a file of save, of this version and byte order. Its hash and every "
-                  "index are checked. trusted=None leaves out the indices where the file is this "
-                  "user's and nobody else may write it (never so on Windows): what was downloaded "
-                  "or unpacked is so as well, therefore None is for folders that only this program "
-                  "fills. The hash finds damage, not forgery. trusted=True leaves out both: one "
-                  "flipped bit may then end the process. mapped uses the pages of a trusted file "
-                  "in place: they may only be replaced as a whole file and not be written to or "
-                  "cut while the Rig lives. Raises DnaError.")
+                  "index are checked. trusted=None skips the check of the indices if this user "
+                  "owns the file and nobody else may write to it (never on Windows). Downloaded "
+                  "and unpacked files meet that condition too, so use None only for folders that "
+                  "only this program fills. The hash finds damage, not forgery. trusted=True skips "
+                  "both checks: one changed bit may then crash the process. mapped uses the pages "
+                  "of a trusted file in place: the file may be replaced as a whole, but must not "
+                  "be written to or cut while the Rig lives. Raises DnaError.")
       .def("block", &block_of, "The same without a copy: a read-only memoryview of uint8.");
 }
 
@@ -341,22 +343,24 @@ void bind_rig_evaluation(RigClass& c) {
             rig::raw_to_gui(r, in.data(), gui.mutable_data());
             return gui;
           },
-          py::arg("raw"), "float32[R] -> float32[G], where the table can be reversed")
+          py::arg("raw"), "float32[R] -> float32[G], if the table can be inverted")
       .def("evaluate", &evaluate, py::arg("raw"), py::arg("lod") = 0, py::arg("settle") = true,
            py::arg("check") = false,
-           "float32[R] -> Pose; a function of raw alone when settle is true. Values outside [0, 1] "
-           "are taken as they are: joints and shapes go on, correctives clamp their factors, maps "
-           "rest outside their intervals. NaN or infinity spoils what its control drives and "
-           "nothing else, and no later pose; with check it is a DnaError that names the control.")
+           "float32[R] -> Pose, which depends on raw alone if settle is true. Outside [0, 1] "
+           "joints and blend shapes extrapolate, correctives clamp their factors, and maps rest "
+           "outside their intervals. NaN or infinity spoils only the outputs that its control "
+           "drives, and no later pose; with check it raises a DnaError that names the control.")
       .def("evaluate_batch", &evaluate_batch, py::arg("raw"), py::arg("lod") = 0,
            py::arg("threads") = 0, py::arg("settle") = true, py::arg("check") = false,
-           "float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores. "
-           "check names the first frame and control that is not finite.")
+           "float32[N, R] -> Pose whose fields have a leading N. threads 0 uses all cores. With "
+           "check a DnaError names the first frame and control that is not finite.")
       .def("find_non_finite", &find_non_finite, py::arg("raw"),
-           "float32[R] or float32[N, R] -> [(frame, name, value)] of all that is NaN or infinite.")
+           "float32[R] or float32[N, R] -> [(frame, name, value)] of all values that are NaN or "
+           "infinite.")
       .def("solver_poses", &solver_poses, py::arg("index"), py::arg("controls"),
-           "Of an RBF solver and a Pose's controls: (float64[poses] distances from its inputs, in "
-           "radians where they are angles; float32[poses] weights, 0 below the threshold).")
+           "Distances and weights of an RBF solver for a Pose's controls: (float64[poses] "
+           "distances of its inputs from each pose, in radians if they are angles; float32[poses] "
+           "weights, 0 below the threshold).")
       .def("instance",
            [](const std::shared_ptr<rig::Rig>& r) { return PyInstance{r, rig::Instance(*r)}; });
 }
@@ -401,7 +405,7 @@ void bind_rig(py::module_& m) {
             }
           },
           "float32, one per region of each mesh, mesh after mesh; at 0 the region's networks rest. "
-          "A copy: assign all of it.")
+          "This is a copy: assign the whole array.")
       .def(
           "evaluate",
           [](PyInstance& s, const py::object& raw, bool check) {
@@ -410,18 +414,22 @@ void bind_rig(py::module_& m) {
             return to_arrays(*s.rig, s.instance.evaluate(in.data()));
           },
           py::arg("raw"), py::arg("check") = false,
-          "float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then.");
+          "float32[R] -> Pose; with check a value that is not finite raises a DnaError, and the "
+          "frame does not count.");
   bind_rig_class(m);
-  m.def("rig_block_version", &rig::block_version, "Of Rig.to_bytes; others are refused.");
+  m.def("rig_block_version", &rig::block_version,
+        "Version of Rig.to_bytes; other versions are refused.");
   m.def(
       "compile_version", [] { return compile::kVersion; },
-      "Of what Rig makes of a DNA; counted up where the poses of an old file change.");
+      "Version of the result of compiling a DNA; it is raised when the poses of an existing file "
+      "change.");
   m.def("quaternion_column_orders", &quaternion_column_orders, py::arg("dna"),
-        "Of each joint group the columns that turn quaternion joints, uint32[n], in the order in "
+        "For each joint group, the columns that turn quaternion joints, uint32[n], in the order in "
         "which their rotations are multiplied.");
   m.def(
       "available_simd", [] { return std::string(simd::available_kernels()); },
-      "The instruction sets that this processor has, as simd= takes them, apart by blanks.");
+      "The instruction sets that this processor supports, as simd= accepts them, separated by "
+      "blanks.");
 }
 
 }  // namespace risorius::bindings

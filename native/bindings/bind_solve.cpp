@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From where a skin shall be to raw controls.
+// Solves for raw controls from target positions of a skin.
 #include <algorithm>
 #include <mutex>
 
@@ -34,7 +34,7 @@ py::array_t<double> made(std::size_t rows, std::size_t columns) {
   return py::array_t<double>({static_cast<py::ssize_t>(rows), static_cast<py::ssize_t>(columns)});
 }
 
-/// Points of a surface with the last Jacobian that was asked for.
+/// Points of a surface with the most recent Jacobian.
 class PyProbe {
  public:
   PyProbe(SurfacePtr surface, const Indices& points)
@@ -183,16 +183,16 @@ void bind_solve(py::module_& m) {
            py::arg("skins"), py::arg("points"))
       .def("positions", &PyProbe::positions, py::arg("raw"), "float32[R] -> float64[P, 3].")
       .def("linearise", &PyProbe::linearise, py::arg("raw"), py::arg("highest"), py::arg("free"),
-           "Keeps what each control does to the points at a pose.")
-      .def("jacobian", &PyProbe::jacobian, "float32[P, 3, R], as linearise found it.")
-      .def("normal_matrix", &PyProbe::normal_matrix, "float64[R, R]: its J^T J.")
+           "Computes and keeps the derivatives of the points by each control at a pose.")
+      .def("jacobian", &PyProbe::jacobian, "float32[P, 3, R], computed by linearise.")
+      .def("normal_matrix", &PyProbe::normal_matrix, "float64[R, R]: J^T J of the Jacobian.")
       .def("gradient", &PyProbe::gradient, py::arg("residual"),
-           "float64[P, 3] -> float64[R]: its J^T residual.");
+           "float64[P, 3] -> float64[R]: J^T residual.");
   m.def("least_change", &least_change, py::arg("a"), py::arg("b"), py::arg("low"), py::arg("high"),
-        py::arg("ridge"), "The x in [low, high] with the least |a x - b|^2 + ridge |x|^2.");
+        py::arg("ridge"), "The x in [low, high] that minimises |a x - b|^2 + ridge |x|^2.");
   m.def("descend", &descend, py::arg("h"), py::arg("g"), py::arg("low"), py::arg("high"),
         py::arg("rest"), py::arg("sparse"), py::arg("start"), py::arg("tolerance") = 1e-5,
-        "The x in [low, high] with the least 1/2 x^T h x - g^T x + sparse |x - rest|.");
+        "The x in [low, high] that minimises 1/2 x^T h x - g^T x + sparse |x - rest|.");
 }
 
 }  // namespace risorius::bindings

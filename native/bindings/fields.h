@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How the fields of Dna's structs become Python properties.
+// Binds the fields of Dna's structs as Python properties.
 #pragma once
 
 #include <array>
@@ -34,9 +34,9 @@ py::class_<T, std::shared_ptr<T>> value_class(py::module_& m, const char* name, 
   return c;
 }
 
-// Each of the following adds one property to a class.
+// Each of the following functions adds one property to a class.
 // In: name  of the property
-//     get   a function from an object to a reference of its field
+//     get   function from an object to a reference to its field
 
 /// Numbers: a NumPy array, float32[n, 3] or [n, 2] for planes of coordinates.
 template <class Class, class Get>
@@ -93,7 +93,7 @@ void number(Class& c, const char* name, Get get) {
       [get](Owner& self, Number value) { get(self) = value; });
 }
 
-/// A struct inside another; the Python object of the inner one keeps the outer one alive.
+/// A nested struct; the Python object of the inner one keeps the outer one alive.
 template <class Class, class Get>
 void part(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -106,7 +106,7 @@ void part(Class& c, const char* name, Get get) {
       [get](Owner& self, const Field& value) { get(self) = value; });
 }
 
-/// A list of structs, as a tuple whose elements can be changed in place.
+/// A list of structs, as a tuple whose elements are mutable.
 template <class Class, class Get>
 void parts(Class& c, const char* name, Get get) {
   using Owner = typename Class::type;
@@ -126,7 +126,7 @@ void parts(Class& c, const char* name, Get get) {
       });
 }
 
-// The words for the units, axes and orders that say how numbers of a file are meant.
+// The words for units, axes and orders of a file.
 inline constexpr std::array<const char*, 2> kTranslationUnits{"cm", "m"};
 inline constexpr std::array<const char*, 2> kRotationUnits{"degrees", "radians"};
 inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
@@ -134,13 +134,13 @@ inline constexpr std::array<const char*, 6> kDirections{"left", "right", "up",
 inline constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 inline constexpr std::array<const char*, 2> kWindings{"ccw", "cw"};
 
-/// The word for a number of an enumeration; one that the format does not know is "#17".
+/// The word for a number of an enumeration; "#17" for a number that the format does not define.
 template <std::size_t kCount>
 std::string word(const std::array<const char*, kCount>& words, std::uint32_t value) {
   return value < kCount ? words[value] : "#" + std::to_string(value);
 }
 
-/// The way back. In: name  of the field. Raises ValueError where the word is not known.
+/// The number for a word. In: name  of the field. Raises ValueError for an unknown word.
 template <class Number, std::size_t kCount>
 Number value_of_word(const std::array<const char*, kCount>& words, const std::string& text,
                      const char* name) {
@@ -153,7 +153,7 @@ Number value_of_word(const std::array<const char*, kCount>& words, const std::st
   throw py::value_error(std::string(name) + ": one of " + known + " was expected, found " + text);
 }
 
-/// An enumeration, as one of the words.
+/// An enumeration, as a word.
 template <class Class, std::size_t kCount, class Get>
 void choice(Class& c, const char* name, const std::array<const char*, kCount>& words, Get get) {
   using Owner = typename Class::type;

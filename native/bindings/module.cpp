@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// risorius._native: arrays in, arrays out, errors. No arithmetic.
+// risorius._native: converts arrays and errors between C++ and Python. No arithmetic.
 #include <pybind11/pybind11.h>
 
 #include "bindings/numpy_arrays.h"
@@ -47,7 +47,7 @@ void throw_error(const core::Error& error, const std::string& file, PyObject* ty
 
 PYBIND11_MODULE(_native, m) {
   m.doc() = "The native part of Risorius: DNA files and rig evaluation.";
-  // Kept for the life of the process, as the interpreter keeps its own exception types.
+  // Kept for the life of the process, like the interpreter's own exception types.
   risorius::bindings::dna_error_type =
       risorius::bindings::new_error_type("risorius.DnaError",
                                          "A DNA file or Dna value that cannot be used.\n\n"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// NumPy views of core arrays and back. A view keeps the buffer alive, not the Dna.
+// Converts core arrays to NumPy views and back. A view keeps the buffer alive, not the Dna.
 #pragma once
 
 #include <pybind11/numpy.h>
@@ -19,28 +19,29 @@ namespace risorius::bindings {
 namespace py = pybind11;
 
 /// Raises an error as its Python class.
-/// In: file  the file that it is about, or ""
-///     type  the class; nullptr: the one that the error's code belongs to
+/// In: file  the file that the error is about, or ""
+///     type  the class; nullptr: the class of the error's code
 void throw_error(const core::Error& error, const std::string& file = "", PyObject* type = nullptr);
-/// A new class of errors below risorius.base.errors.RisoriusError; the caller keeps it for ever.
+/// Makes an error class derived from risorius.base.errors.RisoriusError; the caller keeps it for
+/// ever.
 PyObject* new_error_type(const char* name, const char* doc);
 
-/// The value of a result; raises its error. In: file  as throw_error has it
+/// The value of a result; raises its error. In: file  as in throw_error
 template <class T>
 T unwrap(core::Result<T>&& result, const std::string& file = "") {
   if (!result) throw_error(result.error(), file);
   return std::move(result).value();
 }
 
-/// The same where what is wrong is an argument: raises ValueError.
+/// The same for an invalid argument: raises ValueError.
 template <class T>
 T unwrap_argument(core::Result<T>&& result) {
   if (!result) throw py::value_error(result.error().describe());
   return std::move(result).value();
 }
 
-/// A NumPy view of an array's buffer, which lives as long as the view.
-/// In: shape, strides  of the view, strides in bytes
+/// A NumPy view of an array's buffer. The buffer lives as long as the view.
+/// In: shape, strides  of the view; strides in bytes
 template <class T>
 py::array read_only_view(const core::Array<T>& values, std::vector<py::ssize_t> shape,
                          std::vector<py::ssize_t> strides) {
@@ -80,7 +81,7 @@ py::array to_numpy(const core::PlanarArray<kPlanes>& array) {
 
 using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 
-/// A list of numbers as one of float32. Raises ValueError where it is none, or of another length.
+/// Converts a list of numbers to float32. Raises ValueError for other objects or another length.
 inline FloatArray vector_argument(const py::object& object, const char* name, std::size_t length) {
   FloatArray array = FloatArray::ensure(object);
   if (!array) throw py::value_error(std::string(name) + ": an array of numbers was expected");
@@ -90,8 +91,8 @@ inline FloatArray vector_argument(const py::object& object, const char* name, st
   return array;
 }
 
-/// Numbers as an array of float32 of that shape; NaN and infinity are taken.
-/// Raises ValueError where they are none, or of another shape.
+/// Converts numbers to a float32 array of that shape; NaN and infinity are accepted. Raises
+/// ValueError for other objects or another shape.
 inline FloatArray shaped_argument(const py::object& object, const char* name,
                                   const std::vector<py::ssize_t>& shape) {
   FloatArray array = FloatArray::ensure(object);
@@ -104,8 +105,8 @@ inline FloatArray shaped_argument(const py::object& object, const char* name,
   return array;
 }
 
-/// What a function writes into in place: raises ValueError unless it is a writeable C-contiguous
-/// array of float32 of shape (rows, 3).
+/// An output array of the caller: raises ValueError unless it is a writeable C-contiguous float32
+/// array of shape (rows, 3).
 inline py::array_t<float> written_argument(const py::object& object, const char* name,
                                            py::ssize_t rows) {
   if (!py::isinstance<py::array_t<float, py::array::c_style>>(object)) {
@@ -119,8 +120,8 @@ inline py::array_t<float> written_argument(const py::object& object, const char*
   return out;
 }
 
-/// Copies any sequence of numbers into a core array. In: name  of the argument, for errors.
-/// Raises ValueError where it is none, or where whole numbers do not fit T.
+/// Copies a sequence of numbers to a core array. In: name  of the argument, for errors. Raises
+/// ValueError for other objects, or for integers that do not fit T.
 template <class T>
 core::Array<T> from_python(const py::object& object, const char* name) {
   const py::module_ numpy = py::module_::import("numpy");
@@ -145,7 +146,7 @@ core::Array<T> from_python(const py::object& object, const char* name) {
   return core::Array<T>(std::vector<T>(typed.data(), typed.data() + typed.size()));
 }
 
-/// Copies float[n, planes] into planes. Raises ValueError as from_python.
+/// Copies float[n, planes] to planes. Raises ValueError as from_python.
 template <std::size_t kPlanes>
 core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const char* name) {
   auto typed = py::array_t<float, py::array::c_style | py::array::forcecast>::ensure(object);
@@ -162,8 +163,8 @@ core::PlanarArray<kPlanes> planar_from_python(const py::object& object, const ch
   return {core::Array<float>(std::move(values))};
 }
 
-/// A text of a file as a str. Bytes that are no UTF-8 become surrogates, which text_from_python
-/// turns into the same bytes again.
+/// A text of a file as a str. Bytes that are not UTF-8 become surrogates, which text_from_python
+/// converts back to the same bytes.
 inline py::str to_python(const std::string& text) {
   PyObject* decoded =
       PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "surrogateescape");
@@ -171,7 +172,8 @@ inline py::str to_python(const std::string& text) {
   return py::reinterpret_steal<py::str>(decoded);
 }
 
-/// The way back. Raises ValueError where the object is no text. In: name  of the argument.
+/// Converts a str to the text of a file. Raises ValueError for other objects. In: name  of the
+/// argument
 inline std::string text_from_python(const py::handle& object, const char* name) {
   if (!PyUnicode_Check(object.ptr())) {
     throw py::value_error(std::string(name) + ": a text was expected");

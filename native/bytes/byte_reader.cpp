@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kFirstRead = 512;
 constexpr std::size_t kWindowBytes =
-    std::size_t{64} * 1024;  // stays in the cache between kernel and swap
+    std::size_t{64} * 1024;  // small enough to stay in the cache between the read and the byte swap
 
 }  // namespace
 
@@ -45,7 +45,7 @@ void ByteReader::clear_error() {
   bound();
 }
 
-// Nothing is ready after a failure: the quick ways need not ask for it.
+// After a failure no byte is ready, so that the fast paths need no check for it.
 void ByteReader::bound() {
   const auto loaded = static_cast<std::uint64_t>(loaded_ - at_);
   ready_ = failed() ? at_ : at_ + std::min(loaded, left());
@@ -87,11 +87,10 @@ bool ByteReader::check_left(std::uint64_t bytes) {
 
 bool ByteReader::need(std::size_t n) { return check_left(n) && refill(n, n); }
 
-// Out: n bytes are ready, of `wanted` in sequence as many as the window holds. In: wanted <=
-// left().
+// Makes n bytes ready, and of the `wanted` ones as many as the window holds. In: wanted <= left()
 bool ByteReader::refill(std::size_t n, std::uint64_t wanted) {
   if (window_.size() == 0) window_.resize(kWindowBytes);
-  const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of a cut number
+  const auto rest = static_cast<std::size_t>(loaded_ - at_);  // a few bytes of an incomplete number
   const std::uint64_t begin = position(), most = left();
   if (rest > 0) std::memmove(window_.data(), at_, rest);
   next_read_ = std::clamp(2 * next_read_, kFirstRead, kWindowBytes);
@@ -157,7 +156,7 @@ std::optional<std::uint16_t> ByteReader::peek_u16(std::uint64_t offset) {
 
 std::string ByteReader::str() {
   std::string text(count(1), '\0');
-  if (text.empty()) return text;  // memcpy takes no null pointer, not even for 0 bytes
+  if (text.empty()) return text;  // memcpy accepts no null pointer, not even for 0 bytes
   char* out = text.data();
   for_runs<1>(text.size(), [&](const std::uint8_t* from, std::size_t n) {
     std::memcpy(out, from, n);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A checked big-endian reader over a Source. Every error of a parser comes from here or goes
-// through fail() here, so that it has an offset and a field.
+// A checked big-endian reader over a Source. Every error of a parser is made here or passes through
+// fail() here, so that it has an offset and a field.
 #pragma once
 
 #include <bit>
@@ -17,17 +17,18 @@
 
 namespace risorius::bytes {
 
-/// Reads numbers one after the other. After the first failure every read gives zero or an empty
-/// list and error() stays as it was: a parser checks once per struct, not once per number.
-/// A file is read through a window that never reaches beyond end() and begins small after a jump,
-/// so that what is skipped is not read; of memory nothing is copied but into the lists.
+/// Reads numbers one after the other. After the first failure every read returns zero or an empty
+/// list and error() keeps that failure, so that a parser checks once per struct and not once per
+/// number. A file is read through a window that never reaches beyond end() and begins small after a
+/// jump, so that skipped bytes are not read. Memory is read in place and copied only into the
+/// lists.
 class ByteReader {
  public:
   /// In: source   must outlive the reader
-  ///     kernels  of which the byte order is used; RISORIUS_SIMD or the CPU chooses them
+  ///     kernels  its byte swaps are used; by default RISORIUS_SIMD or the CPU decides
   explicit ByteReader(Source& source, const simd::Kernels& kernels = simd::usual_kernels());
 
-  /// The name of the kernels, as Rig.simd has it.
+  /// The name of the kernels, as in Rig.simd.
   const char* simd() const { return kernels_->name; }
 
   ByteReader(const ByteReader&) = delete;
@@ -41,25 +42,26 @@ class ByteReader {
   bool failed() const { return error_.has_value(); }
   const core::Error& error() const { return *error_; }
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
-  /// After this, enter() reads on somewhere else.
+  /// Clears the error, so that enter() can continue elsewhere.
   void clear_error();
-  /// No list may have more elements, whatever the bytes would allow.
+  /// The largest number of elements of a list, even if more bytes are left.
   void set_max_count(std::uint32_t n) { max_count_ = n; }
-  /// Remembers an error, unless there is one already.
-  /// In: offset  the byte of the file that is wrong; the field is what where() says now
+  /// Remembers an error, unless there is one already. The field is the present where().
+  /// In: offset  the wrong byte in the file
   void fail_at(std::uint64_t offset, core::ErrorCode code, std::string message);
 
-  /// Restricts reading to [offset, offset + size). Out: whether that lies inside the source; if not
-  /// the reader has failed.
+  /// Restricts reading to [offset, offset + size). Out: false, with an error set, if the range lies
+  /// outside of the source.
   bool enter(std::uint64_t offset, std::uint64_t size);
-  /// The window begins small again, as after a jump: little of what comes next may be wanted.
+  /// Makes the window small again, as after a jump: call it if little of the following bytes is
+  /// needed.
   void read_small() { next_read_ = 0; }
 
   std::uint8_t u8() { return number<std::uint8_t>(); }
   std::uint16_t u16() { return number<std::uint16_t>(); }
   std::uint32_t u32() { return number<std::uint32_t>(); }
   float f32() { return std::bit_cast<float>(u32()); }
-  /// A count is believed only if count * element_size bytes are left.
+  /// A count is accepted only if count * element_size bytes are left.
   std::uint32_t count(std::uint32_t element_size) {
     if (ready_ - at_ >= 4) {
       const std::uint32_t n = load<std::uint32_t>(at_);
@@ -70,27 +72,28 @@ class ByteReader {
     }
     return count_slowly(element_size);
   }
-  /// The number at offset, if it lies between here and end(). Reading goes on where it was.
+  /// The number at offset, if it lies between the present position and end(). Does not move the
+  /// position.
   std::optional<std::uint16_t> peek_u16(std::uint64_t offset);
-  /// A count, then so many bytes of text.
+  /// A count, then that number of bytes of text.
   std::string str();
   std::vector<std::uint8_t> bytes(std::uint64_t size);
   void skip(std::uint64_t size);
-  /// A count, then so many numbers.
-  /// Out: all_finite   becomes false when a value is infinite or no number; is never made true
+  /// A count, then that number of values.
+  /// Out: all_finite   set to false if a value is infinite or NaN; never set to true
   core::Array<float> f32_list(bool* all_finite = nullptr);
   core::Array<std::uint16_t> u16_list();
-  /// A count, then so many numbers.
-  /// Out: largest      grows to the largest value
+  /// A count, then that number of values.
+  /// Out: largest      raised to the largest value
   core::Array<std::uint32_t> u32_list(std::uint32_t* largest = nullptr);
-  /// Reads n values without a count, straight into out. In: n already checked by count(). What is
-  /// in out after a failure is not defined.
+  /// Reads n values without a count, straight into out. In: n already checked by count(). After a
+  /// failure the content of out is undefined.
   void read_f32(float* out, std::size_t n, bool* all_finite = nullptr);
   /// The same; largest as in u32_list.
   void read_u16(std::uint16_t* out, std::size_t n);
   void read_u32(std::uint32_t* out, std::size_t n, std::uint32_t* largest = nullptr);
 
-  /// Field path of what is being read, for errors: push on entry, pop on exit (see Field).
+  /// The path of the field that is being read, for errors: push on entry, pop on exit (see Field).
   std::string where() const;
 
  private:
@@ -115,7 +118,7 @@ class ByteReader {
     return v;
   }
   std::uint32_t count_slowly(std::uint32_t element_size);
-  /// take(at, n) gets every value once, in runs as long as the window has.
+  /// Calls take(at, n) for all values, in runs as long as the window allows.
   template <std::size_t kSize, class Take>
   bool for_runs(std::size_t n, const Take& take);
   bool check_left(std::uint64_t bytes);
@@ -128,8 +131,8 @@ class ByteReader {
   Source* source_;
   std::uint64_t end_ = 0;
   std::uint32_t max_count_ = 0xFFFFFFFF;
-  // [first_, loaded_) are the bytes from window_begin_ on: the window's, or all of a source in
-  // memory. [at_, ready_) of them may be read: they are inside the region, and nothing failed.
+  // [first_, loaded_) are the bytes from window_begin_ on: the window's, or all bytes of a source
+  // in memory. [at_, ready_) may be read: it lies inside the region, and nothing has failed.
   std::uint64_t window_begin_ = 0;
   const std::uint8_t* first_ = nullptr;
   const std::uint8_t* at_ = nullptr;

@@ -10,7 +10,7 @@
 
 namespace risorius::bytes {
 
-/// Appends numbers to a growing list of bytes. Nothing can fail but the memory.
+/// Appends numbers to a growing list of bytes. Fails only if memory runs out.
 class ByteWriter {
  public:
   std::size_t position() const { return bytes_.size(); }
@@ -51,7 +51,7 @@ class ByteWriter {
       }
     }
   }
-  /// Writes v at an earlier position (sizes and offsets that are known only afterwards).
+  /// Writes v at an earlier position, for sizes and offsets that are known only later.
   void patch_u32(std::size_t at, std::uint32_t v) {
     for (std::size_t i = 0; i < 4; ++i)
       bytes_[at + i] = static_cast<std::uint8_t>(v >> (24 - 8 * i));

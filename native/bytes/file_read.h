@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A whole file in memory, and whose it is.
+// Reads a whole file into memory, and tells whether it is the user's own.
 #pragma once
 
 #include <cstdint>
@@ -12,22 +12,22 @@
 namespace risorius::bytes {
 
 struct FileBytes {
-  std::span<const std::uint8_t> bytes;  // on a multiple of 64
-  std::shared_ptr<const void> owner;    // of bytes
-  /// The user of this process owns the file and nobody else may write it. Asked of the open file,
-  /// not of its name. Never true where files have no such modes (Windows).
+  std::span<const std::uint8_t> bytes;  // aligned to 64
+  std::shared_ptr<const void> owner;    // keeps the bytes alive
+  /// The user of this process owns the file and nobody else may write to it. Checked on the open
+  /// file, not on its name. Always false on systems without such modes (Windows).
   bool is_own = false;
 };
 
 enum class ReadBy {
   kCopy,
-  /// The pages of the file itself: costs nothing before they are used. A file that is cut short or
-  /// written to meanwhile ends the process or changes under its reader: only for files that are
-  /// replaced as a whole (write_file_atomically). A copy where the system has no such maps.
+  /// Maps the pages of the file, which costs nothing until they are used. If the file is cut short
+  /// the process crashes, and if it is written to the bytes change: use it only for files that are
+  /// replaced as a whole (write_file_atomically). Systems without maps get a copy.
   kMap,
 };
 
-/// Fails: kIoOpen, kIoRead (the system's reason; what is no plain file; a file that is cut while it
+/// Fails: kIoOpen, kIoRead (the system's reason; not a plain file; a file that is cut while it is
 ///        is read)
 core::Result<FileBytes> read_file(const std::filesystem::path& path, ReadBy by = ReadBy::kCopy);
 

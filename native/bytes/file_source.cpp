@@ -11,7 +11,7 @@
 #define NOMINMAX
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-// After it.
+// These follow windows.h.
 #include <fcntl.h>
 #include <io.h>
 #else
@@ -28,7 +28,7 @@ namespace {
 using Handle = std::FILE*;
 
 Handle open_for_reading(const std::filesystem::path& path) {
-  // As on POSIX: others may write into the file meanwhile, rename it, or put another in its place.
+  // As on POSIX: other programs may write into the file, rename it or replace it meanwhile.
   const HANDLE handle = CreateFileW(path.c_str(), GENERIC_READ,
                                     FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, nullptr,
                                     OPEN_EXISTING, FILE_ATTRIBUTE_NORMAL, nullptr);
@@ -44,7 +44,7 @@ Handle open_for_reading(const std::filesystem::path& path) {
     number < 0 ? static_cast<void>(CloseHandle(handle)) : static_cast<void>(_close(number));
     return nullptr;
   }
-  // The reader above has a window of its own; a second buffer would only copy.
+  // The reader has a window of its own; a second buffer would only add a copy.
   std::setvbuf(file, nullptr, _IONBF, 0);
   return file;
 }

@@ -17,7 +17,7 @@
 #define NOMINMAX
 #define WIN32_LEAN_AND_MEAN
 #include <windows.h>
-// After it.
+// These follow windows.h.
 #include <fcntl.h>
 #include <io.h>
 #include <process.h>
@@ -68,7 +68,7 @@ std::ptrdiff_t write_some(int file, const std::uint8_t* bytes, std::size_t count
 
 int sync_file(int file) { return _commit(file); }
 int close_file(int file) { return _close(file); }
-int sync_folder(const fs::path&) { return 0; }  // a new name is in the journal of the volume
+int sync_folder(const fs::path&) { return 0; }  // the journal of the volume holds new names
 
 long long process_number() { return _getpid(); }
 
@@ -86,8 +86,8 @@ std::string machine_name() {
   return GetComputerNameA(name, &length) ? std::string(name, length) : std::string();
 }
 
-// All that is known of rights here is whether a file may be written at all; one that may not is not
-// replaced, and a new one of that kind could not be removed.
+// Windows only has a read-only flag: a read-only file is not replaced, and a read-only new file
+// could not be removed.
 void inherit_rights(const fs::path&, const fs::path&) {}
 
 #else
@@ -115,13 +115,14 @@ int sync_folder(const fs::path& folder) {
 
 long long process_number() { return ::getpid(); }
 
-// In some containers nobody asks for the ends of processes that lost their parent: such a process
-// has its number for as long as the container runs, and does nothing any more.
+// In some containers nobody collects orphaned processes that have ended: they keep their number as
+// zombies for as long as the container runs.
 bool has_ended(long long process) {
   std::ifstream stat("/proc/" + std::to_string(process) + "/stat");
   std::string text;
   std::getline(stat, text, '\0');
-  const std::size_t end = text.rfind(") ");  // of the program's name, which may hold anything
+  // End of the program's name, which may contain any character.
+  const std::size_t end = text.rfind(") ");
   return end != std::string::npos && end + 2 < text.size() &&
          (text[end + 2] == 'Z' || text[end + 2] == 'X');
 }
@@ -131,7 +132,7 @@ bool is_running(long long process) {
   return !has_ended(process);
 }
 
-// Containers of one machine number their processes each for itself.
+// Containers of one machine number their processes independently.
 std::string machine_name() {
   char name[256] = {};
   if (::gethostname(name, sizeof(name) - 1) != 0) return {};
@@ -141,8 +142,8 @@ std::string machine_name() {
          (length > 0 ? std::string(space, static_cast<std::size_t>(length)) : "");
 }
 
-// A file that a group shares stays that group's. Where it cannot, another group gets no more than
-// everybody has.
+// Keeps the group of a file that a group shares. If that is not allowed, the new group gets only
+// the rights that everybody has.
 void keep_group(const fs::path& old, const fs::path& made, fs::perms& rights) {
   struct stat before = {}, now = {};
   if (::stat(old.c_str(), &before) != 0 || ::stat(made.c_str(), &now) != 0) return;
@@ -175,7 +176,7 @@ std::error_code last_error() { return {errno == 0 ? EIO : errno, std::generic_ca
 
 // ---- names
 
-// Of this machine's processes: ".risorius-MACHINE-"; then come PROCESS-TOKEN.part.
+// ".risorius-MACHINE-" for the processes of this machine; PROCESS-TOKEN.part follows.
 std::string name_begin() {
   std::string machine = machine_name().substr(0, kMachineLength);
   std::replace_if(
@@ -193,7 +194,7 @@ std::string hidden_name() {
   return name_begin() + std::to_string(process_number()) + "-" + token + std::string(kEnd);
 }
 
-// The process that made a file of this name; nothing for a name that is not ours.
+// The number of the process that made a file of this name; empty for other names.
 std::optional<long long> maker_of(std::string_view name, std::string_view begin) {
   constexpr std::size_t kTail = 1 + kTokenDigits + kEnd.size();
   if (!name.starts_with(begin) || !name.ends_with(kEnd)) return {};
@@ -226,11 +227,11 @@ const FileCalls& system_file_calls() {
 }
 
 fs::path linked_file(const fs::path& path) {
-  constexpr int kMostLinks = 40;  // as the system's own limit
+  constexpr int kMostLinks = 40;  // the same limit as the system's
   fs::path file = path;
   std::error_code error;
   for (int i = 0; i < kMostLinks && fs::is_symlink(file, error); ++i) {
-    // The file that a link leads to need not be there yet.
+    // The target of a link need not exist yet.
     const fs::path next = fs::read_symlink(file, error);
     if (error) return path;
     file = file.parent_path() / next;
@@ -309,7 +310,7 @@ std::optional<NewFile> NewFile::beside(const fs::path& target, std::error_code& 
   const bool is_private = fs::exists(target, ignored);
   const fs::path folder = target.parent_path();
   auto file = create(folder / hidden_name(), Leftover::kRemove, error, calls, is_private);
-  // Windows says of a file that stands there what it says of a folder that is not there.
+  // Windows reports a file in the place of a folder like a missing folder.
   if (error == std::errc::no_such_file_or_directory && fs::is_regular_file(folder, ignored)) {
     error = std::make_error_code(std::errc::not_a_directory);
   }
@@ -327,7 +328,8 @@ std::optional<NewFile> NewFile::adopt(const fs::path& path, std::error_code& err
 }
 
 std::error_code NewFile::write(std::span<const std::uint8_t> bytes) {
-  constexpr std::size_t kMost = std::size_t{1} << 30;  // macOS and Windows refuse 2 GiB and more
+  // MacOS and Windows refuse 2 GiB and more in one call.
+  constexpr std::size_t kMost = std::size_t{1} << 30;
   while (!bytes.empty()) {
     errno = 0;
     const std::ptrdiff_t n = calls_->write(file_, bytes.data(), std::min(bytes.size(), kMost));
@@ -341,8 +343,8 @@ std::error_code NewFile::write(std::span<const std::uint8_t> bytes) {
 std::error_code NewFile::close() {
   if (file_ < 0) return {};
   errno = 0;
-  // A network folder may say only now that there is no room. After an interruption the descriptor
-  // is gone as well.
+  // A network folder may report a full disk only on close. After an interruption the descriptor is
+  // closed as well.
   const bool closed = calls_->close(std::exchange(file_, -1)) == 0 || errno == EINTR;
   return closed ? std::error_code() : last_error();
 }
@@ -357,7 +359,7 @@ std::error_code NewFile::take_place_of(const fs::path& target) {
   errno = 0;
   if (calls_->rename(path_, target) != 0) return last_error();
   leftover_ = Leftover::kKeep;
-  // Some network folders do not know it, and the file is in its place already.
+  // Some network folders do not support it, and the file is already in place.
   static_cast<void>(calls_->sync_folder(target.parent_path()));
   return {};
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where bytes come from: a span in memory or a file that is read piece by piece.
+// Source of bytes: a span in memory, or a file that is read in pieces.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@ class Source {
  public:
   virtual ~Source() = default;
   virtual std::uint64_t size() const = 0;
-  /// Reads up to out.size() bytes at offset. Out: how many there were (fewer only at the end).
+  /// Reads up to out.size() bytes at offset. Out: the number of bytes read; smaller only at the end
   virtual std::size_t read(std::uint64_t offset, std::span<std::uint8_t> out) = 0;
-  /// All the bytes, when they are in memory anyway and stay there; else nothing.
+  /// All bytes, if they are in memory for the lifetime of the source; otherwise empty.
   virtual std::span<const std::uint8_t> view() const { return {}; }
 };
 
@@ -33,8 +33,8 @@ class SpanSource final : public Source {
   std::span<const std::uint8_t> bytes_;
 };
 
-/// Opens a file for reading. No memory map: a file that is cut short meanwhile gives an error and
-/// not a signal. Fails: kIoOpen with the system's reason.
+/// Opens a file for reading. It is not mapped, because a mapped file that is cut short would crash
+/// the process. Fails: kIoOpen with the system's reason.
 core::Result<std::unique_ptr<Source>> open_file(const std::filesystem::path& path);
 
 }  // namespace risorius::bytes

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Control animation: named curves over time, for any rig that has controls of these names.
+// Control animation: named curves over time, for any rig that has controls with these names.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace risorius::clip {
 
-/// Something that happens at a time of a clip: a word, a note, a reaction to fire.
+/// An event at a time of a clip: a word, a note, a reaction to fire.
 struct Event {
   double time = 0.0;  // seconds, on the clip's own clock
   std::string name;
@@ -21,23 +21,23 @@ struct Event {
   bool operator==(const Event&) const = default;
 };
 
-/// What is known of a clip before its first frame.
+/// The properties of a clip that are known before its first frame.
 struct Head {
-  std::vector<std::string> names;  // of controls, each once
+  std::vector<std::string> names;  // control names, each once
   double rate = 60.0;              // frames per second, above 0
   double start = 0.0;              // seconds, the time of the first frame
-  bool has_times = false;          // frames have times of their own; else start + i / rate
+  bool has_times = false;  // frames have individual times; otherwise frame i is at start + i / rate
   std::vector<std::pair<std::string, std::string>> metadata;
 
   bool operator==(const Head&) const = default;
 };
 
-/// Curves of named controls. Bits are kept: NaN payloads, -0 and denormals included.
+/// Curves of named controls. All bits are preserved, including NaN payloads, -0 and denormals.
 struct Clip {
   Head head;
   std::size_t frame_count = 0;
   std::vector<float> curves;  // [controls, frames]
-  std::vector<double> times;  // [frames], seconds, ascending; empty without has_times
+  std::vector<double> times;  // [frames], seconds, ascending; empty if has_times is false
   std::vector<Event> events;
 
   std::span<const float> curve(std::size_t control) const {

@@ -27,7 +27,7 @@ using detail::Used;
 using rig::RigData;
 
 // In:  finite  all numbers of the file are known to be finite
-// Out: kept  the joint matrices, which out.joint_halves has or neither of its arrays
+// Out: kept  the joint matrices; `out` holds them only as joint_halves
 Result<RigData> compile_parts(const dna::Dna& dna, bool finite, const CompileOptions& options,
                               core::Budget& budget, KeptMatrices& kept) {
   RigData out;
@@ -102,7 +102,7 @@ Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options) {
   }
   core::Budget own = budget_for(dna);
   KeptMatrices kept;
-  const bool finite = warnings.empty();  // there is one for each list with a number that is not
+  const bool finite = warnings.empty();  // each list with a value that is not finite has a warning
   core::Budget& budget = options.budget != nullptr ? *options.budget : own;
   auto out = compile_parts(dna, finite, options, budget, kept);
   if (!out) return core::Unexpected{out.error()};

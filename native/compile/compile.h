@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dna -> Rig and Mesh -> Morph: the only folder that knows both sides.
+// Compiles a Dna to a Rig and a Mesh to a Morph. Only this folder knows both sides.
 #pragma once
 
 #include <array>
@@ -19,43 +19,45 @@ enum class Rotation { kEuler, kQuaternion };
 enum class Precision { kFloat32, kFloat16 };
 
 struct CompileOptions {
-  const simd::Kernels* kernels = nullptr;     // nullptr: the best that this CPU has
+  const simd::Kernels* kernels = nullptr;     // nullptr: the best that this CPU supports
   Precision precision = Precision::kFloat32;  // of the joint matrices
   Rotation rotation = Rotation::kEuler;       // form of the rotations in a pose
-  core::Budget* budget = nullptr;             // nullptr: one of budget_for(dna)
+  core::Budget* budget = nullptr;             // nullptr: budget_for(dna)
 };
 
-/// What compiling a face may take: 1 MiB and 64 times its bytes of lists and matrices that are no
-/// copies of lists in the file, and 2^28 and 256 times its bytes of steps, to compile it and to
-/// evaluate it once at every LOD.
+/// The limits for compiling a face and evaluating it once at every LOD: 1 MiB plus 64 times the
+/// face's bytes for lists and matrices, without copies of lists in the file; and 2^28 plus 256
+/// times the face's bytes for steps.
 core::Budget budget_for(const dna::Dna& dna);
 
-/// Compiles the behavior of a face. The result keeps nothing of the Dna.
-/// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field: a Dna may have been edited;
-///        kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded (the format's
-///        indices, the budget).
-/// From:  dna-format 12; joint matrices by columns, so that inactive columns cost nothing
+/// Compiles the behavior of a face. The result does not refer to the Dna.
+/// Fails: kInvalidIndex, kInvalidLength, kInvalidValue with the field, because a Dna may have been
+///        edited; kInvalidValue for a joint value beyond 65504 in float16; kLimitExceeded (the
+///        format's indices, the budget)
+/// From:  dna-format 12; joint matrices are stored by columns, so that inactive columns cost
+///        nothing
 core::Result<rig::Rig> compile(const dna::Dna& dna, const CompileOptions& options = {});
 
-/// What compile makes of a file; counted up where the poses of an old file change. What was
-/// compiled by another version is compiled anew.
+/// The version of the results of compile. It is raised when the poses of an existing file change;
+/// rigs compiled by another version are compiled again.
 constexpr std::uint32_t kVersion = 2;
 
-/// [joints]: those whose rotation the file's joint metadata declares a quaternion.
+/// [joints]: true if the file's joint metadata declares the rotation a quaternion.
 std::vector<bool> quaternion_joints(const dna::Dna& dna);
 
 /// The columns of a joint group that turn quaternion joints, in the order in which their rotations
-/// are multiplied: that of the reference, whose storage swaps columns that are empty at a LOD to
-/// the end. Columns that already stand by the number of their LODs, most first, keep their order.
-/// In:    quaternion_joints  of the group's file, as quaternion_joints() has it
+/// are multiplied. It is the order of the reference, whose storage swaps columns that are empty at
+/// a LOD to the end. Columns that are sorted by the number of their LODs, largest first, keep their
+/// order.
+/// In:    quaternion_joints  of the group's file, from quaternion_joints()
 /// Out:   columns of the group, each at most once
-/// Cost:  the values of the rows that turn quaternion joints
+/// Cost:  proportional to the values of the rows that turn quaternion joints
 std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
                                                    std::uint32_t lod_count,
                                                    const std::vector<bool>& quaternion_joints);
 
 /// Compiles the blend shape targets of one mesh; each delta d is stored as matrix * d.
-/// In:    matrix  row-major 3x3, e.g. the file's axes and units to the scene's
+/// In:    matrix  row-major 3x3, for example from the file's axes and units to the scene's
 /// Fails: kInvalidIndex
 core::Result<rig::Morph> compile_morph(const dna::Dna& dna, std::size_t mesh_index,
                                        const std::array<float, 9>& matrix);

@@ -20,14 +20,15 @@ using core::ErrorCode;
 using core::fail;
 using core::ok;
 
-// Whether four columns are: a file may list a group's controls in any order.
+// Whether four columns are adjacent in the file, which may list a group's controls in any order.
 bool side_by_side(const KeptColumn* four) {
   bool all = true;
   for (std::uint32_t i = 1; i < 4; ++i) all = all && four[i].column == four[0].column + i;
   return all;
 }
 
-// In tiles: both sides are read and written by whole cache lines, four columns at a time.
+// Transposes in tiles, so that both sides are read and written by whole cache lines, four columns
+// at a time.
 // In: from  [rows, stride]
 void transpose(const float* from, std::size_t rows, std::size_t stride,
                std::span<const KeptColumn> columns, float* to) {
@@ -72,7 +73,7 @@ void KeptMatrices::write(std::span<float> to) const {
 
 namespace {
 
-// Rows of a group at each LOD. Those beyond what any LOD has are never evaluated and not stored.
+// The rows of a group at each LOD. Rows that no LOD uses are never evaluated and are not stored.
 core::Result<std::uint32_t> add_lods(const dna::JointGroup& g, const std::string& where,
                                      RigData& out) {
   if (!g.output_indices.empty()) {
@@ -110,7 +111,7 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   rig::JointGroup group;
   group.row_count = *rows;
   std::vector<std::uint16_t>& outputs = out.joint_outputs;
-  // The rows of a long group fill whole vectors. Rows added for that have no place in a pose.
+  // The rows of a wide group fill whole vectors. The rows added for that have no place in a pose.
   const auto fill = [&] {
     if (*rows < simd::kWidest) return;
     outputs.resize(simd::rounded_up(outputs.size()), g.output_indices[0]);
@@ -123,7 +124,7 @@ Status compile_joint_group(const dna::JointGroup& g, const std::string& where, R
   return ok();
 }
 
-// The lowest row in which each column has a value: at LODs with fewer rows it does nothing.
+// The lowest row in which each column has a value: at LODs with fewer rows the column does nothing.
 std::vector<std::uint32_t> first_rows_with_values(const dna::JointGroup& g, std::uint32_t rows) {
   const std::size_t columns = g.input_indices.size();
   std::vector<std::uint32_t> first(columns, rows), missing(columns);
@@ -148,7 +149,7 @@ struct ColumnEntry {
   std::uint32_t group, column;
 };
 
-// In the same order where the control is the same.
+// Sorts by control; entries of one control keep their order.
 std::vector<ColumnEntry> by_control(const std::vector<ColumnEntry>& entries,
                                     std::uint32_t control_count) {
   std::vector<std::size_t> next(control_count + std::size_t{1});
@@ -159,7 +160,8 @@ std::vector<ColumnEntry> by_control(const std::vector<ColumnEntry>& entries,
   return out;
 }
 
-// The columns that have any value, by control and group: what a control drives lies together.
+// The columns that have any value, by control and group, so that the columns of one control lie
+// together.
 std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& used) {
   std::vector<ColumnEntry> entries;
   for (std::uint32_t i = 0; i < out.joint_groups.size(); ++i) {
@@ -179,7 +181,7 @@ std::vector<ColumnEntry> list_columns(const Groups& groups, RigData& out, Used& 
   return by_control(entries, out.control_count);
 }
 
-// The columns once more, by group and then by control.
+// Lists the same columns by group and then by control.
 void list_by_group(const std::vector<ColumnEntry>& entries, RigData& out) {
   std::vector<std::uint32_t> next;
   std::uint32_t begin = 0;
@@ -193,7 +195,7 @@ void list_by_group(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-// What each control costs at each LOD, and all of them.
+// The reads of each control, and of all controls, at each LOD.
 void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   const std::size_t stride = out.control_count + std::size_t{1};
   out.control_reads.resize(out.lod_count * stride);
@@ -210,7 +212,7 @@ void count_reads(const std::vector<ColumnEntry>& entries, RigData& out) {
   }
 }
 
-// Where each column will lie, by control and group.
+// Assigns the place of each column, by control and group.
 Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entries, RigData& out,
                      KeptMatrices& kept) {
   for (std::size_t i = 0; i < groups.size(); ++i) {
@@ -225,7 +227,7 @@ Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entri
     end = to;
   };
   for (const ColumnEntry& e : entries) {
-    // A column begins on whole vectors, unless it is shorter than one: those lie side by side.
+    // Wide columns begin on whole vectors; columns shorter than a vector lie side by side.
     const std::uint32_t rows = out.joint_groups[e.group].row_count;
     if (rows >= simd::kWidest && end % simd::kWidest != 0) leave(simd::rounded_up(end));
     const auto offset = static_cast<std::uint32_t>(end);
@@ -240,12 +242,12 @@ Status place_columns(const Groups& groups, const std::vector<ColumnEntry>& entri
   }
   std::partial_sum(out.joint_column_begins.begin(), out.joint_column_begins.end(),
                    out.joint_column_begins.begin());
-  leave(end + simd::kWidest);  // kernels read on
+  leave(end + simd::kWidest);  // kernels read past the last column
   kept.size = static_cast<std::size_t>(end);
   return ok();
 }
 
-// Columns without a value are not kept, and those hold nothing that is not finite.
+// Columns without a value are not stored, but they hold only zeros.
 bool all_finite(const KeptMatrices& kept) {
   return std::ranges::all_of(kept.matrices, [](const KeptMatrices::Matrix& m) {
     const std::size_t count = m.rows * m.group->input_indices.size();
@@ -260,14 +262,14 @@ Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatr
   const std::vector<ColumnEntry> entries = list_columns(groups, out, used);
   RISORIUS_TRY(place_columns(groups, entries, out, kept));
   list_by_group(entries, out);
-  // A column at rest may be read where that costs less, but 0 times infinity is no 0.
+  // A resting column may be read if that costs less, but 0 times infinity is not 0.
   if (finite || all_finite(kept)) count_reads(entries, out);
   return ok();
 }
 
 namespace {
 
-// Which row each joint attribute takes at a LOD; the last group that writes it wins.
+// The row that gives each joint attribute its value at a LOD; the last group that writes it wins.
 std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
                                              std::span<const std::uint32_t> file_order,
                                              std::uint32_t lod) {
@@ -281,7 +283,7 @@ std::vector<std::uint32_t> rows_by_attribute(const RigData& r,
   return rows;
 }
 
-// The rows that one block of attributes takes, as pieces of rows that follow each other.
+// Lists the rows that one block of attributes takes, as pieces of consecutive rows.
 void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData& out) {
   out.joint_pieces.push_back({0, 0, static_cast<std::uint16_t>(block)});
   simd::Piece* piece = &out.joint_pieces.back();
@@ -298,7 +300,7 @@ void add_pieces(std::span<const std::uint32_t> rows, std::size_t block, RigData&
   }
 }
 
-// The blocks that each group's rows reach.
+// Finds the blocks that each group's rows reach.
 void find_blocks(RigData& out) {
   for (rig::JointGroup& g : out.joint_groups) {
     const auto rows = std::span(out.joint_outputs).subspan(g.rows_begin, g.row_count);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The graph of networks, and the joints that they move. From: dna-format 12.3, 12.5
+// Compiles the graph of networks, and the joints that networks move. From: dna-format 12.3, 12.5
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -25,7 +25,7 @@ using detail::StepLods;
 using rig::MlOperation;
 using rig::RigData;
 
-// Files without layer mlbe: each network gathers its inputs and scatters its outputs.
+// For files without layer mlbe: each network gathers its inputs and scatters its outputs.
 dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   dna::MlType type;
   type.lod_operation_mappings.assign(3, ml.lod_neural_network_mapping);
@@ -51,7 +51,7 @@ dna::MlType synthesized(const dna::MachineLearnedBehavior& ml) {
   return type;
 }
 
-// By network: the first region that lists it.
+// The mask of each network: the first region that lists it.
 std::map<std::uint16_t, std::uint32_t> masks_of_networks(const dna::Dna& dna, RigData& out) {
   std::map<std::uint16_t, std::uint32_t> masks;
   for (const auto& mesh : dna.machine_learned_behavior.region_network_indices) {
@@ -63,7 +63,7 @@ std::map<std::uint16_t, std::uint32_t> masks_of_networks(const dna::Dna& dna, Ri
   return masks;
 }
 
-// Controls that hold the last part of the quaternion of a joint.
+// Controls that hold the w of a joint's quaternion.
 std::vector<bool> joint_w_controls(const dna::Dna& dna, std::uint32_t controls) {
   std::vector<bool> w(controls, false);
   const dna::MlJoints& joints = dna.machine_learned_behavior_ext.joints;
@@ -85,7 +85,7 @@ class GraphCompiler {
         rests_at_one_(joint_w_controls(dna, out.control_count)) {}
 
   Status add_type(const dna::MlType& type, const std::string& where) {
-    // Operation o of set s is number numbers_[s][o]; those of later sets come after.
+    // Operation o of set s has the number numbers_[s][o]; later sets have higher numbers.
     numbers_.clear();
     first_ = count_of(out_.ml_operations);
     std::uint32_t next = first_;
@@ -121,7 +121,7 @@ class GraphCompiler {
       case MlOperation::kWeightedSum:
         op.value_count = source.parameters.empty() ? 0 : source.parameters[0];
         break;
-      default:  // does nothing
+      default:  // an unknown operation does nothing
         op.kind = MlOperation::kWeightedSum;
     }
     RISORIUS_TRY(budget_.take_bytes(sizeof(float) * std::uint64_t{op.value_count}, where));
@@ -134,7 +134,7 @@ class GraphCompiler {
     return ok();
   }
 
-  // What it reads of others. A network that gathers reads nothing else.
+  // Adds the values that it reads from other operations. A network that gathers reads nothing else.
   Status add_segments(const dna::MlOperation& source, MlOperation& op, const std::string& where) {
     std::vector<const MlOperation*> others;
     bool gathers = false;
@@ -189,7 +189,7 @@ class GraphCompiler {
     if (!table && !is_first) {
       op.items_begin = shared->second;
     } else {
-      if (table && is_first) layers_.erase(shared);  // these rows are this operation's own
+      if (table && is_first) layers_.erase(shared);  // these rows belong to this operation alone
       RISORIUS_TRY(add_layers(source, network, number, where));
     }
     if (op.item_count > 0) op.value_count = out_.ml_layers[op.items_begin + op.item_count - 1].rows;
@@ -205,7 +205,7 @@ class GraphCompiler {
     return ok();
   }
 
-  // Operations may share a network.
+  // Adds a layer; operations may share a network.
   Status add_layer(const dna::NeuralNetworkLayer& source, std::uint16_t network, std::size_t index,
                    const std::string& where) {
     rig::MlLayer layer;
@@ -231,7 +231,7 @@ class GraphCompiler {
     return ok();
   }
 
-  // Rows of the newest layer at each LOD: all, unless the operation has a table of them.
+  // The rows of the newest layer at each LOD: all of them, unless the operation has a table.
   void add_row_counts(const dna::MlOperation& source, std::size_t layer, std::size_t layers) {
     const std::size_t lods = out_.lod_count;
     const bool table = source.parameters.size() >= 1 + layers * lods;
@@ -242,7 +242,7 @@ class GraphCompiler {
     }
   }
 
-  // An operation runs at a LOD that lists it, if what it reads runs there.
+  // An operation runs at a LOD that lists it if the operations it reads run there.
   Status list_lods(const dna::MlType& type, const std::string& where) {
     for (std::uint32_t lod = 0; lod < out_.lod_count; ++lod) {
       std::vector<bool> runs_here(out_.ml_operations.size() - first_, false);  // of this type
@@ -276,12 +276,13 @@ class GraphCompiler {
   std::map<std::uint16_t, std::uint32_t> masks_;
   std::vector<bool> rests_at_one_;
   std::map<std::pair<std::uint16_t, std::size_t>, std::uint32_t> weights_;
-  std::map<std::uint16_t, std::uint32_t> layers_;  // of networks whose LODs have all rows: first
+  // First layer of each network that has all rows at every LOD.
+  std::map<std::uint16_t, std::uint32_t> layers_;
   std::vector<std::vector<std::uint32_t>> numbers_;
-  std::uint32_t first_ = 0;  // operation of the type
+  std::uint32_t first_ = 0;  // first operation of the type
 };
 
-// Rows are the directions of the axes; 0 left 1 right 2 up 3 down 4 front 5 back.
+// Rows are the directions of the axes: 0 left 1 right 2 up 3 down 4 front 5 back.
 std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>& axes) {
   std::array<std::array<float, 3>, 3> rows{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -291,7 +292,7 @@ std::array<std::array<float, 3>, 3> basis_of(const std::array<std::uint16_t, 3>&
   return rows;
 }
 
-// The system of the joints' values, if the file gives all of it.
+// The axes and Euler angles of the joints' values, if the file gives all of them.
 void add_system(const dna::Dna& dna, RigData& out) {
   const dna::MlJoints& joints = dna.machine_learned_behavior_ext.joints;
   std::map<std::uint16_t, std::uint16_t> settings;
@@ -340,7 +341,7 @@ Status detail::compile_networks(const dna::Dna& dna, Budget& budget, RigData& ou
     const std::string where = "machine_learned_behavior_ext.types[" + std::to_string(t) + "]";
     RISORIUS_TRY(graph.add_type(types[t], where));
   }
-  if (!out.ml_layers.empty()) {  // kernels read on
+  if (!out.ml_layers.empty()) {  // kernels read past the last layer
     out.ml_weights.resize(out.ml_weights.size() + simd::kWidest);
   }
   return ok();

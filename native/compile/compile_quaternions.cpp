@@ -16,7 +16,7 @@ namespace {
 
 using rig::RigData;
 
-// The first row of each column that turns a quaternion joint; kNone where there is none.
+// The first row in which each column turns a quaternion joint; kNone: it turns none.
 std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
                                               const std::vector<bool>& quaternion_joints) {
   const std::size_t columns = g.input_indices.size();
@@ -32,7 +32,7 @@ std::vector<std::uint32_t> first_turning_rows(const dna::JointGroup& g,
   return first;
 }
 
-// Rotation rows of a joint in a group, by axis; kNone where there is none.
+// Rotation rows of a joint in a group, by axis; kNone: no row.
 using RotationRows = std::array<std::uint32_t, 3>;
 
 std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, std::uint32_t rows) {
@@ -46,7 +46,7 @@ std::map<std::uint32_t, RotationRows> rotation_rows(const dna::JointGroup& g, st
   return out;
 }
 
-// One column of a group: a term for each joint that it turns at all. A missing row is 0.
+// Adds one column of a group with a term for each joint that it turns. A missing row is 0.
 void add_column(const dna::JointGroup& g, std::size_t c, const std::vector<RotationRows>& rows,
                 std::uint32_t first_slot, RigData& out) {
   const std::size_t columns = g.input_indices.size();
@@ -74,7 +74,7 @@ std::uint32_t levels_of(std::uint32_t row, const RigData& out, std::uint32_t gro
   return levels;
 }
 
-// Every row counts, also those that a later one for the same angle hides at finer LODs.
+// Counts every row, even if a later row for the same angle hides it at finer LODs.
 void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
                         const std::vector<bool>& flags, const RigData& out,
                         std::vector<std::uint32_t>& euler) {
@@ -85,7 +85,7 @@ void count_euler_levels(const dna::JointGroup& g, std::uint32_t index,
   }
 }
 
-// In: levels  per joint, 0 where no Euler angles turn it
+// In: levels  per joint: number of LODs; 0 if no Euler angles turn it
 void list_euler_joints(const std::vector<std::uint32_t>& levels, RigData& out) {
   for (std::uint32_t j = 0; j < out.joint_count && out.joint_stride == 10; ++j) {
     if (levels[j] > 0) out.euler_joints.push_back(static_cast<std::uint16_t>(j));
@@ -133,7 +133,8 @@ std::vector<std::uint32_t> quaternion_column_order(const dna::JointGroup& g,
     if (first[c] != rig::kNone) order.push_back(c);
   }
   std::size_t live = order.size();  // values at every LOD so far
-  std::uint32_t rows = UINT32_MAX;  // a LOD of as many rows finds no other column empty
+  // the smallest row count so far; a LOD with at least as many rows leaves the order unchanged
+  std::uint32_t rows = UINT32_MAX;
   for (std::size_t l = 0; l < lod_count && l < g.lods.size(); ++l) {
     if (g.lods[l] >= rows) continue;
     rows = g.lods[l];

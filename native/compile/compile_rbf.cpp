@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers: targets in the form that inputs take, radii, and inverses. From: dna-format 12.4
+// Compiles radial solvers: converted targets, radii and inverse matrices. From: dna-format 12.4
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -20,7 +20,7 @@ using detail::count_of;
 using detail::is_corrective;
 using rig::RigData;
 
-// Of two targets, by number.
+// The distance between two targets.
 double distance(const RigData& r, const rig::RbfSolver& s, std::uint32_t a, std::uint32_t b) {
   const double* targets = r.rbf_targets.data() + s.targets_begin;
   return rig::rbf_distance(s.distance, targets + std::size_t{a} * s.input_count,
@@ -36,7 +36,7 @@ double mean_distance(const RigData& r, const rig::RbfSolver& s) {
   return pairs == 0 ? 0.0 : sum / pairs;
 }
 
-// Gauss and Jordan with the largest pivot of each column. Out: the smallest pivot.
+// Gauss-Jordan elimination with the largest pivot of each column. Out: the smallest pivot
 double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
   double smallest = 1.0;
   out.assign(n * n, 0.0);
@@ -66,9 +66,8 @@ double invert(std::vector<double> m, std::vector<double>& out, std::size_t n) {
   return smallest;
 }
 
-// The matrix of kernels between targets turned over. Targets that are the same but for rounding
-// make it singular: then they share what they are near to, where the reference gives it to any of
-// them.
+// Inverts the matrix of kernels between targets. Targets that differ only by rounding make it
+// singular: such poses then share their weight, whereas the reference gives it to any one of them.
 void add_inverse(rig::RbfSolver& s, RigData& out) {
   constexpr double kSingular = 1e-10, kRidge = 1e-8;
   const std::size_t n = s.pose_count;
@@ -99,7 +98,7 @@ void add_targets(const dna::RbfSolver& source, rig::RbfSolver& s, RigData& out) 
   }
 }
 
-// The poses of a file, each compiled once: solvers may list one any number of times.
+// The poses of a file, each compiled once: solvers may list a pose any number of times.
 class PoseLists {
  public:
   PoseLists(const dna::Dna& dna, RigData& out) : dna_(dna), out_(out) {
@@ -114,7 +113,7 @@ class PoseLists {
   }
 
  private:
-  // What a pose writes; in files without layer rbfe it is a control of its own.
+  // The outputs of a pose; in files without layer rbfe its only output is its own control.
   rig::RbfPose compile(std::uint16_t index) {
     const auto& ext = dna_.rbf_behavior_ext;
     rig::RbfPose pose;
@@ -152,7 +151,7 @@ Status check_solver(const dna::RbfSolver& s, const std::string& where) {
                   " controls, but a distance of rotations needs four for each");
 }
 
-// Distances between all poses, and the matrix of those that interpolate.
+// Counts the distances between all poses, and the matrix of an interpolative solver.
 Status take_matrices(const dna::RbfSolver& s, const std::string& where, detail::Budget& budget) {
   const std::uint64_t n = s.pose_indices.size();
   const std::uint64_t inputs = s.raw_control_indices.size() + 1;
@@ -164,7 +163,8 @@ Status take_matrices(const dna::RbfSolver& s, const std::string& where, detail::
   return budget.take_steps(n * n * n, where);
 }
 
-// What evaluating the solver's poses takes: one that is listed often is read and written often.
+// Counts the cost of evaluating the solver's poses; a pose that is listed several times counts each
+// time.
 Status add_poses(const dna::RbfSolver& source, const std::string& where, PoseLists& poses,
                  detail::Budget& budget, RigData& out) {
   std::uint64_t steps = 0;

@@ -51,7 +51,7 @@ std::vector<rig::ConditionalRow> compile_table(const dna::Conditionals& source) 
   return rows;
 }
 
-// Whether a run adds something where its input is 0.
+// Whether a run adds something if its input is 0.
 bool adds_at_rest(const std::vector<rig::ConditionalRow>& rows, std::size_t begin) {
   for (std::size_t i = begin; i < rows[begin].run_end; ++i) {
     const rig::ConditionalRow& row = rows[i];
@@ -69,7 +69,7 @@ std::vector<rig::RowRun> runs_of(const std::vector<rig::ConditionalRow>& rows) {
   return runs;
 }
 
-// The channels of each control. Left empty where two of them have one output.
+// Lists the channels of each control. The lists stay empty if two channels write one output.
 void list_shapes_of_controls(RigData& out) {
   std::vector<bool> taken(std::size_t{UINT16_MAX} + 1);
   for (const std::uint16_t output : out.shape_outputs) {
@@ -86,7 +86,7 @@ void list_shapes_of_controls(RigData& out) {
   }
 }
 
-// Bounds of a row as a number that sorts: -0 is 0, and what is no number equals nothing.
+// The bounds of a row as a sortable number: -0 counts as 0.
 std::uint64_t bounds_key(const rig::ConditionalRow& row) {
   const auto bits = [](float v) { return std::uint64_t{std::bit_cast<std::uint32_t>(v + 0.0f)}; };
   return bits(row.from) << 32 | bits(row.to);
@@ -96,7 +96,7 @@ bool has_number_bounds(const rig::ConditionalRow& row) {
   return row.from == row.from && row.to == row.to;
 }
 
-// The first row of each row's range: rows of one GUI control with equal bounds.
+// The first row of each row's range: rows of one GUI control with equal bounds form a range.
 std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::ConditionalRow>& rows,
                                                 std::uint64_t& steps) {
   std::vector<std::uint32_t> order(rows.size()), first(rows.size());
@@ -119,7 +119,7 @@ std::vector<std::uint32_t> first_rows_of_ranges(const std::vector<rig::Condition
   return first;
 }
 
-// Of each GUI control its rows, in ranges of equal bounds, in the order of their first rows.
+// Lists the rows of each GUI control in ranges of equal bounds, in the order of their first rows.
 Status list_gui_ranges(core::Budget& budget, RigData& out) {
   std::uint64_t steps = 0;
   const std::vector<std::uint32_t> first = first_rows_of_ranges(out.gui_rows, steps);
@@ -143,7 +143,8 @@ bool is_quaternion_w(std::string_view name) {
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// 0, but 1 for the last part of each quaternion that solvers, setups and networks read or write.
+// Sets the w of each quaternion that solvers, setups and networks read or write to 1, all others to
+// 0.
 void compile_initial_controls(const dna::Dna& dna, RigData& out) {
   out.initial_controls.assign(out.control_count, 0.0f);
   const auto& names = dna.definition.raw_control_names;

@@ -14,7 +14,7 @@ namespace {
 using rig::RigData;
 using rig::TwistSwing;
 
-// A setup without four inputs has no rotation to spread.
+// A setup without four inputs has no rotation to distribute.
 void add_setup(const dna::TwistSwingSetup& source, TwistSwing::Kind kind, RigData& out) {
   if (source.input_control_indices.size() != 4) return;
   TwistSwing setup;

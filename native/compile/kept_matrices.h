@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The joint matrices of a face between its file and its block. Private to native/compile.
+// The joint matrices of a face before they are written into its block. Private to native/compile.
 #pragma once
 
 #include <cstddef>
@@ -12,12 +12,12 @@
 
 namespace risorius::compile::detail {
 
-// A column of a group, and where it is kept.
+// A column of a group, and its offset in the block.
 struct KeptColumn {
   std::uint32_t column, offset;
 };
 
-// The columns of all groups, which stay in the matrices of the file until the block is there.
+// The columns of all groups. Their values stay in the matrices of the file until the block exists.
 struct KeptMatrices {
   struct Matrix {
     const dna::JointGroup* group;
@@ -26,7 +26,7 @@ struct KeptMatrices {
   };
   std::vector<Matrix> matrices;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> gaps;  // between columns: first, end
-  std::size_t size = 0;                                       // of all, in floats
+  std::size_t size = 0;                                       // total, in floats
 
   // Out: to  [size], overwritten
   void write(std::span<float> to) const;

@@ -32,17 +32,17 @@ struct StepLods {
   std::vector<std::vector<std::uint32_t>> operations, solvers;
 };
 
-/// As a Rig writes counts and places in its arrays.
+/// Counts and indices are 32-bit numbers in a Rig.
 inline std::uint32_t count_of(const auto& list) { return static_cast<std::uint32_t>(list.size()); }
 
 /// In:    where  the field of the indices
-/// Fails: kInvalidIndex where an index is not below limit.
+/// Fails: kInvalidIndex if an index is not below limit.
 Status check_controls(const Array<std::uint16_t>& indices, std::uint32_t limit,
                       const std::string& where);
-/// Fails: kInvalidLength where a list of numbers for each LOD is too short. In: where  its owner
+/// Fails: kInvalidLength if a list with a number for each LOD is too short. In: where  its owner
 Status check_lods(const Array<std::uint16_t>& lods, std::uint32_t lod_count,
                   const std::string& where);
-/// Correctives own their controls: nothing else writes those.
+/// Correctives own their controls: nothing else writes them.
 inline bool is_corrective(const RigData& r, std::uint32_t control) {
   return control >= r.raw_count && control < r.raw_count + r.psd_count;
 }
@@ -51,19 +51,19 @@ std::vector<std::uint32_t> listed(const dna::LodMapping& mapping, std::uint32_t 
 
 rig::EulerConvention euler_convention(const dna::Dna& dna);
 
-// The steps of compile(), in the order in which it takes them. Each reads its layers of the Dna and
-// fills its arrays of `out`; some need what earlier ones filled. Fails: as compile().
+// The steps of compile(), in their order. Each reads its layers of the Dna and fills its arrays of
+// `out`; some need arrays that earlier steps filled. Fails: as compile().
 
-/// Names, sizes, the neutral pose and the table of GUI controls. In: budget  is asked for sorting
+/// Names, sizes, the neutral pose and the table of GUI controls. In: budget  limits the sorting
 Status compile_frame(const dna::Dna& dna, Budget& budget, RigData& out);
-/// Groups that coarser LODs have come first.
+/// Groups that coarser LODs use come first.
 Groups list_groups(const dna::Dna& dna);
 Status compile_joint_groups(const dna::Dna& dna, const Groups& groups, RigData& out);
 /// Needs the joint groups.
 /// In: groups  of the file, in the order of out.joint_groups
 void compile_quaternion_joints(const dna::Dna& dna, const Groups& groups, RigData& out);
-/// In: budget  is asked before matrices and lists are made
-/// Out: lods   the solvers of each LOD; compile_networks: the operations
+/// In: budget  limits matrices and lists before they are made
+/// Out: lods   the solvers of each LOD; of compile_networks: the operations
 Status compile_solvers(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods);
 Status compile_networks(const dna::Dna& dna, Budget& budget, RigData& out, StepLods& lods);
 Status compile_ml_joints(const dna::Dna& dna, RigData& out);
@@ -72,25 +72,25 @@ void mark_ml_joints(const RigData& r, Used& used);
 void compile_twist_and_swing(const dna::Dna& dna, RigData& out);
 Status compile_channels_and_maps(const dna::Dna& dna, RigData& out);
 Status compile_psds(const dna::Dna& dna, RigData& out);
-/// Joints that any group, setup or network moves at any LOD.
+/// Lists the joints that any group, setup or network moves at any LOD.
 void list_joints_written(RigData& out);
 /// In:  finite  all numbers of the file are known to be finite
 /// Out: kept, used  the columns of the groups, and the controls that they read
 Status compile_columns(const Groups& groups, bool finite, RigData& out, KeptMatrices& kept,
                        Used& used);
-/// Marks the inputs of channels and maps within their row counts.
+/// Marks the inputs of channels and maps, up to the row counts of each LOD.
 void mark_channels_and_maps(const RigData& r, Used& used);
 
-/// Needs everything else: decides which correctives are watched, and fills the lists of steps of
-/// each LOD. In: used  which controls the outputs of a LOD read
-///     lods  which operations and solvers run at a LOD
+/// Chooses the watched correctives, and fills the lists of steps of each LOD. Call it last.
+/// In: used  the controls that the outputs of a LOD read
+///     lods  the operations and solvers that run at a LOD
 Status schedule(const Used& used, const StepLods& lods, Budget& budget, RigData& out);
 
-/// With quaternions as output a joint has ten rows: the scale moves by one.
+/// Shifts the scale by one: with quaternions as output a joint has ten attributes.
 Status widen_joint_rows(RigData& out);
-/// Which rows of the groups each joint attribute takes at each LOD.
+/// Finds the rows that each joint attribute takes at each LOD.
 void compile_pieces(const Groups& groups, RigData& out);
-/// The joint matrices as float16.
+/// Converts the joint matrices to float16.
 Status narrow(const KeptMatrices& kept, RigData& out);
 
 }  // namespace risorius::compile::detail

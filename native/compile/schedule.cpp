@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The order of evaluation: what is watched, and the lists of steps of each LOD.
+// The order of evaluation: chooses the watched correctives, and lists the steps of each LOD.
 #include <algorithm>
 #include <functional>
 #include <iterator>
@@ -27,10 +27,10 @@ std::span<const std::uint16_t> factors(const RigData& r, const rig::Psd& p) {
   return {r.psd_factors.data() + p.factors_begin, p.factor_count};
 }
 
-// Lists of numbers, one after the other.
+// Lists of numbers in one array.
 class Lists {
  public:
-  // In: each  each(add) calls add(list, number) for all of them, twice the same
+  // In: each  each(add) calls add(list, number) for all entries; it is called twice
   template <class Each>
   static Result<Lists> collect(std::size_t lists, Budget& budget, Each each) {
     Lists out;
@@ -53,9 +53,9 @@ class Lists {
   std::vector<std::uint32_t> begins_, items_;
 };
 
-// Everything that reads and writes controls, as nodes: operations, solvers, correctives. What
-// writes a control comes before what reads it. The controls stand between the two, so that n
-// writers and n readers of one are 2 n edges and not their product.
+// Operations, solvers and correctives as the nodes of a graph. A node that writes a control comes
+// before the nodes that read it. The controls are nodes in between, so that n writers and n readers
+// of one control have 2 n edges and not n * n.
 class Graph {
  public:
   static Result<Graph> make(const RigData& r, Budget& budget) {
@@ -100,13 +100,13 @@ class Graph {
     if (!is_psd(n)) return rig::make_step(StepKind::kSolver, n - operations_);
     return rig::make_step(StepKind::kPsd, n - operations_ - solvers_);
   }
-  /// Controls that n writes, each once.
+  /// The controls that n writes, each once.
   std::span<const std::uint32_t> written(std::uint32_t n) const { return written_.of(n); }
-  /// Nodes that read the control, each once.
+  /// The nodes that read the control, each once.
   std::span<const std::uint32_t> readers(std::uint32_t control) const {
     return readers_.of(control);
   }
-  /// Nodes that must run after n whatever they read.
+  /// The nodes that must run after n even if they read nothing from it.
   std::span<const std::uint32_t> after(std::uint32_t n) const { return after_.of(n); }
 
  private:
@@ -115,7 +115,7 @@ class Graph {
         operations_(static_cast<std::uint32_t>(r.ml_operations.size())),
         solvers_(static_cast<std::uint32_t>(r.rbf_solvers.size())) {}
 
-  // Calls f(n, control) for what each node reads or writes, once for each pair.
+  // Calls f(n, control) for the controls that each node reads or writes, once for each pair.
   template <class Each, class F>
   void for_once(Each each, F f) const {
     std::vector<std::uint32_t> last(r_->control_count, rig::kNone);
@@ -168,8 +168,8 @@ class Graph {
     }
   }
 
-  // Of what writes one control each after the one before it in the file, and operations after
-  // those whose values they read.
+  // Nodes that write the same control run in the order of the file, and operations run after the
+  // operations whose values they read.
   template <class F>
   void for_edges(F f) const {
     std::vector<std::uint32_t> last(r_->control_count, rig::kNone);
@@ -198,14 +198,15 @@ class Graph {
 };
 
 struct Order {
-  std::vector<std::uint32_t> sorted;  // first what others need, ties by number
-  std::vector<std::uint32_t> cyclic;  // members of cycles, and what hangs on them
+  std::vector<std::uint32_t> sorted;  // in the order of their dependencies; ties by number
+  std::vector<std::uint32_t> cyclic;  // members of cycles, and the nodes that depend on them
 };
 
-// How many nodes each node still waits for, itself or through a control that they write.
+// The number of nodes that each node still waits for, directly or through a control that they
+// write.
 class Waiting {
  public:
-  // In: nodes  each once; others are taken as done
+  // In: nodes  each once; other nodes count as done
   Waiting(const Graph& g, const std::vector<std::uint32_t>& nodes)
       : g_(g), here_(g.size(), false), nodes_(g.size(), 0), controls_(g.control_count(), 0) {
     for (const std::uint32_t n : nodes) here_[n] = true;
@@ -220,7 +221,7 @@ class Waiting {
 
   bool is_ready(std::uint32_t n) const { return nodes_[n] == 0; }
 
-  /// Calls f(m) for each node that waited for n alone.
+  /// Calls f(m) for each node that waited only for n.
   template <class F>
   void finish(std::uint32_t n, F f) {
     const auto done = [&](std::uint32_t m) {
@@ -238,7 +239,7 @@ class Waiting {
   std::vector<std::uint32_t> nodes_, controls_;
 };
 
-// In: nodes  ascending; others are taken as done
+// In: nodes  ascending; other nodes count as done
 Order order_of(const Graph& g, std::vector<std::uint32_t> nodes) {
   nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());  // a file may list one twice
   Waiting waiting(g, nodes);
@@ -258,10 +259,10 @@ Order order_of(const Graph& g, std::vector<std::uint32_t> nodes) {
   return order;
 }
 
-// Operations and solvers that need no corrective, directly or not, and no cycle.
+// Operations and solvers that depend on no corrective, directly or indirectly, and on no cycle.
 struct Early {
   std::vector<bool> nodes;
-  std::vector<bool> controls;  // all that writes them is early
+  std::vector<bool> controls;  // true if all writers of the control are early
 };
 
 Early find_early(const Graph& g) {
@@ -285,7 +286,8 @@ Early find_early(const Graph& g) {
   return early;
 }
 
-// Which factor watches each corrective; kNone where a factor may change after the watchers looked.
+// The factor that watches each corrective; kNone if a factor may change after the watchers are
+// read.
 std::vector<std::uint32_t> choose_watchers(const RigData& r, const Early& early) {
   std::vector<std::uint32_t> load(r.control_count, 0), watchers;
   const auto late = [&](std::uint16_t control) {
@@ -332,7 +334,7 @@ void add_list(const Graph& g, const std::vector<std::uint32_t>& nodes, RigData& 
   r.step_begins.push_back(static_cast<std::uint32_t>(r.steps.size()));
 }
 
-// Correctives in the order in which their watchers look.
+// Sorts correctives by the order in which their watchers are read.
 void sort_correctives(RigData& r) {
   std::vector<std::uint32_t> number(r.psds.size(), rig::kNone);
   std::vector<rig::Psd> psds;
@@ -356,7 +358,7 @@ void sort_correctives(RigData& r) {
   }
 }
 
-// What running each operation and solver once takes.
+// The cost of running each operation and solver once.
 class Costs {
  public:
   explicit Costs(const RigData& r) : r_(r), layers_(1, 0), segments_(1, 0), poses_(1, 0) {
@@ -388,10 +390,10 @@ class Costs {
   }
 
   const RigData& r_;
-  std::vector<std::uint64_t> layers_, segments_, poses_;  // sums up to each
+  std::vector<std::uint64_t> layers_, segments_, poses_;  // running sums
 };
 
-// A LOD may list a step any number of times.
+// Counts the steps of all LODs; a LOD may list a step any number of times.
 Status take_steps_of_lists(const RigData& r, const StepLods& lods, Budget& budget) {
   const Costs costs(r);
   std::uint64_t operations = 0, solvers = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Vectors whose storage begins on a cache line, for kernels.
+// Vectors whose storage begins on a cache line, as kernels need it.
 #pragma once
 
 #include <cstddef>
@@ -28,10 +28,10 @@ struct AlignedAllocator {
   bool operator==(const AlignedAllocator&) const { return true; }
 };
 
-/// What new memory holds: zeros, or whatever was there before.
+/// The content of new memory: zeros, or undefined.
 enum class Fill { kZero, kNothing };
-/// Memory that begins on a cache line. 2 MiB and more are asked for in large pages where the system
-/// has them: memory that is read at random then costs fewer look-ups of addresses.
+/// Memory that begins on a cache line. Blocks of 2 MiB and more use large pages if the system has
+/// them, because random reads then need fewer address translations.
 /// In: size in bytes
 std::shared_ptr<std::uint8_t> allocate_pages(std::size_t size, Fill fill = Fill::kZero);
 

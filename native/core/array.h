@@ -78,7 +78,7 @@ class List {
   List() : items_(std::make_shared<std::vector<T>>()) {}
   List(std::vector<T> items) : items_(std::make_shared<std::vector<T>>(std::move(items))) {}
   List(const List& other) : List(*other.items_) {}
-  // What was moved from is an empty list, and that one needs memory.
+  // A moved-from list is an empty list, which needs memory of its own.
   // NOLINTNEXTLINE(bugprone-unsafe-to-allow-exceptions)
   List(List&& other) noexcept(false) : List() { items_.swap(other.items_); }
   List& operator=(List other) {

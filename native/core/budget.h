@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a stage may take in proportion to its input: bytes and steps, counted and not timed.
+// Limits on the memory and the steps of a stage, in proportion to its input; counted, not timed.
 #pragma once
 
 #include <cstdint>
@@ -10,17 +10,17 @@
 
 namespace risorius::core {
 
-/// Handed through a stage, which asks before it stores or does what grows faster than its input.
-/// Plain copies of the input are not asked for.
+/// Passed through a stage, which asks it before any storage or work that grows faster than the
+/// input. Plain copies of the input are not counted.
 class Budget {
  public:
   static constexpr std::uint64_t kUnlimited = ~std::uint64_t{0};
 
-  /// In: stage  begins the message, e.g. "compiling"
+  /// In: stage  first word of the error message, e.g. "compiling"
   Budget(std::string stage, std::uint64_t most_bytes, std::uint64_t most_steps)
       : stage_(std::move(stage)), most_bytes_(most_bytes), most_steps_(most_steps) {}
 
-  /// Fails: kLimitExceeded with the field, what was asked for in all, and the limit.
+  /// Fails: kLimitExceeded with the field, the requested total, and the limit.
   Status take_bytes(std::uint64_t count, const std::string& where) {
     return take(count, bytes_, most_bytes_, "bytes", where);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Memory for numbers that are about to be read, which nobody wrote zeros to.
+// Memory for numbers that are about to be read from a file, without writing zeros first.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,9 @@
 
 namespace risorius::core {
 
-/// An array whose new elements are unset: what fills it touches its memory first and once. Becomes
-/// an Array without a copy. Growing is std::realloc's business, which moves pages and not bytes.
+/// An array whose new elements are unset, so that its memory is touched only once, when it is
+/// filled. It becomes an Array without a copy. Growth uses std::realloc, which moves pages instead
+/// of bytes.
 template <class T>
 class Buffer {
   static_assert(std::is_trivially_copyable_v<T> && alignof(T) <= alignof(std::max_align_t));
@@ -28,7 +29,7 @@ class Buffer {
   T* data() { return data_.get(); }
   T& operator[](std::size_t i) { return data_.get()[i]; }
 
-  /// Keeps what is there. The first time exactly n are allocated, later on half as many again.
+  /// Keeps the elements. The first call allocates exactly n, later ones grow by half.
   void resize(std::size_t n) {
     if (n > capacity_) allocate(capacity_ == 0 ? n : std::max(n, capacity_ + capacity_ / 2));
     size_ = n;
@@ -36,7 +37,7 @@ class Buffer {
   void reserve(std::size_t n) {
     if (n > capacity_) allocate(n);
   }
-  /// Hands the memory over, cut to size.
+  /// Transfers ownership of the memory, cut to size.
   std::shared_ptr<const T> release() {
     if (size_ < capacity_) allocate(size_);
     size_ = capacity_ = 0;
@@ -51,7 +52,7 @@ class Buffer {
 #ifdef __cpp_exceptions
     throw std::bad_alloc();
 #else
-    std::abort();  // as the standard library does without exceptions (WebAssembly)
+    std::abort();  // like the standard library without exceptions (WebAssembly)
 #endif
   }
   void allocate(std::size_t n) {
@@ -61,7 +62,7 @@ class Buffer {
       if (n > std::numeric_limits<std::size_t>::max() / sizeof(T)) no_memory();
       void* p = std::realloc(data_.get(), n * sizeof(T));
       if (p == nullptr) no_memory();
-      (void)data_.release();  // realloc has freed it or gives it back
+      (void)data_.release();  // realloc has freed the memory or returned it
       data_.reset(static_cast<T*>(p));
     }
     capacity_ = n;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A function that is handed down and called, not kept: what C++26 names std::function_ref.
+// A function argument that is called but not stored, like std::function_ref of C++26.
 #pragma once
 
 #include <concepts>
@@ -12,15 +12,15 @@ namespace risorius::core {
 template <class Signature>
 class FunctionRef;
 
-/// Stands for a function or lambda that lives longer than it; two pointers, nothing allocated. A
-/// function that takes one is compiled once, where a template is compiled for each lambda.
+/// Refers to a function or lambda that lives longer; two pointers, no allocation. A function that
+/// takes a FunctionRef is compiled once, whereas a template is compiled for each lambda.
 template <class Result, class... Args>
 class FunctionRef<Result(Args...)> {
  public:
   template <class F>
     requires(!std::same_as<std::remove_cvref_t<F>, FunctionRef> &&
              std::is_invocable_r_v<Result, F&, Args...>)
-  // NOLINTNEXTLINE(google-explicit-constructor): a lambda is given where it is wanted
+  // NOLINTNEXTLINE(google-explicit-constructor): a lambda converts implicitly
   FunctionRef(F&& function)
       : object_(const_cast<void*>(static_cast<const void*>(std::addressof(function)))),
         call_([](void* object, Args... args) -> Result {

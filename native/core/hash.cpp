@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "core/hash.h"
 
-#define XXH_INLINE_ALL  // no library to link, and no symbols that another copy could meet
+#define XXH_INLINE_ALL  // no library to link, and no symbols that could clash with another copy
 #include <xxhash.h>
 
 namespace risorius::core {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The checksum of compiled faces and of .rzc files: it finds damage, not intent.
+// The checksum of compiled faces and of .rzc files. It finds damage, not tampering.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace risorius::core {
 
-/// XXH64 with the seed 0, as its specification has it; as fast as memory.
+/// XXH64 with seed 0, as specified; as fast as memory.
 std::uint64_t xxh64(std::span<const std::uint8_t> bytes);
 
 }  // namespace risorius::core

@@ -11,11 +11,11 @@
 
 namespace risorius::core {
 
-/// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores,
-/// and never more than 256). What a body throws, such as bad_alloc, is thrown again when all
-/// threads have ended; of several the first.
-/// In: ranges  for each thread; several where the work of one may be far more than of another: who
-/// is done takes the next
+/// Calls body(begin, end) on ranges that cover [0, n), on up to `threads` threads (0: all cores;
+/// never more than 256). The first exception of a body, such as bad_alloc, is thrown again after
+/// all threads have ended.
+/// In: ranges  number of ranges per thread; use several if ranges may differ much in work, because
+///             a thread that is done takes the next range
 template <class Body>
 void parallel_for(std::size_t n, std::size_t threads, const Body& body, std::size_t ranges = 1) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
@@ -33,7 +33,7 @@ void parallel_for(std::size_t n, std::size_t threads, const Body& body, std::siz
       for (std::size_t r = next++; r < count; r = next++) {
         body(n * r / count, n * (r + 1) / count);
       }
-    } catch (...) {  // beyond the thread it would end the process
+    } catch (...) {  // an exception that leaves a thread ends the process
       const std::lock_guard held(lock);
       if (!failure) failure = std::current_exception();
     }

@@ -12,16 +12,16 @@
 namespace risorius::core {
 
 enum class ErrorCode {
-  kNotDna,                 // the first bytes are not a DNA signature
-  kNotClip,                // the first bytes are not those of a .rzc file
-  kUnsupportedGeneration,  // a DNA file of another generation than 2, a clip of another version
-  kTruncated,              // the bytes end before the structure does
-  kInvalidCount,           // a count that cannot fit the bytes left or a limit
+  kNotDna,                 // the file does not begin with a DNA signature
+  kNotClip,                // the file does not begin with the signature of a .rzc file
+  kUnsupportedGeneration,  // a DNA file of a generation other than 2, or a clip of another version
+  kTruncated,              // the bytes end inside a structure
+  kInvalidCount,           // a count that does not fit the remaining bytes or a limit
   kInvalidLength,          // parallel lists of different lengths
-  kInvalidIndex,           // an index outside its space
-  kInvalidValue,   // any other value that makes no sense (cycle, LOD row beyond the matrix ...)
-  kMissingLayer,   // a layer that the operation needs is not in the file
-  kLimitExceeded,  // more than the caller's limits allow
+  kInvalidIndex,           // an index outside its range
+  kInvalidValue,           // any other impossible value (cycle, LOD row beyond the matrix ...)
+  kMissingLayer,           // the file lacks a layer that the operation needs
+  kLimitExceeded,          // more than the caller's limits allow
   kIoOpen,
   kIoRead,
   kIoWrite,
@@ -31,17 +31,17 @@ enum class ErrorCode {
 /// The name of a code as Python and the command line show it, e.g. "invalid_count".
 const char* to_string(ErrorCode code);
 
-/// What went wrong and where.
+/// The kind and the place of an error.
 /// offset   byte offset in the file, if the error has one
 /// where    the DNA field, e.g. "behavior.joint_groups[3].values"
-/// message  one sentence: what was found and what was expected
+/// message  one sentence with the found and the expected value
 struct Error {
   ErrorCode code = ErrorCode::kInvalidValue;
   std::optional<std::uint64_t> offset;
   std::string where;
   std::string message;
 
-  /// One sentence for people: message, field and offset.
+  /// One sentence for the user: message, field and offset.
   std::string describe() const;
 };
 
@@ -49,10 +49,10 @@ struct Unexpected {
   Error error;
 };
 
-/// A failure, which every Result and Status can be made of.
+/// A failure, from which any Result and Status can be constructed.
 /// In: where    the field, e.g. "behavior.psds.rows[3]", or ""
-///     message  one sentence: what was expected, what was found
-///     offset   the byte of the file, where it is known
+///     message  one sentence: the expected and the found value
+///     offset   the byte in the file, if it is known
 [[nodiscard]] inline Unexpected fail(ErrorCode code, std::string where, std::string message,
                                      std::optional<std::uint64_t> offset = std::nullopt) {
   return Unexpected{Error{code, offset, std::move(where), std::move(message)}};
@@ -86,8 +86,8 @@ inline Status ok() { return Status(Nothing{}); }
 
 }  // namespace risorius::core
 
-/// Evaluates a Status or a Result; where it failed the function that this stands in returns the
-/// failure, else nothing happens and the value is dropped.
+/// Evaluates a Status or a Result. If it failed, the enclosing function returns the failure;
+/// otherwise the value is dropped.
 #define RISORIUS_TRY(expression)                                                \
   do {                                                                          \
     if (auto tried = (expression); !tried) return std::move(tried).propagate(); \

@@ -117,7 +117,7 @@ class Forgetting {
   void inputs(const std::vector<bool>& keep, Array<std::uint16_t>& indices) {
     if (!keep.empty()) indices = renumbered(map_, only(indices, keep));
   }
-  // A corrective is a product: with a factor that stays 0 it is 0, and so it is without factors.
+  // A corrective is a product: if one factor stays 0, or if it has no factors, it is 0.
   void psds() {
     Psds& p = dna_.behavior.psds;
     std::vector<bool> is_lost(map_.size(), false);
@@ -193,7 +193,7 @@ void drop_layer(std::string_view id, Dna& dna) {
   });
   dna.unread_controls = {};
   const ControlCounts after = control_counts(dna);
-  // Without rbfe each pose is a control: these may be more than there were.
+  // Without rbfe each pose is a control, so that there may be more pose controls than before.
   dna.unread_controls = {before.psd - after.psd, before.ml - after.ml,
                          before.rbf_pose - std::min(before.rbf_pose, after.rbf_pose)};
 }

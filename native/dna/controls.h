@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The control space raw | corrective | network | RBF pose: how many of each, and what is left when
-// some of the layers that provide them go.
+// The control space raw | corrective | network | RBF pose: the sizes of its parts, and their
+// renumbering when layers that provide controls are dropped.
 #pragma once
 
 #include <cstddef>
@@ -13,8 +13,8 @@
 
 namespace risorius::dna {
 
-/// Sizes of the four parts of the control space, in its order. The poses of a 2.4 file, which has
-/// no layer rbfe, are controls of their own.
+/// Sizes of the four parts of the control space, in its order. In a 2.4 file, which has no layer
+/// rbfe, each RBF pose is a control of its own.
 struct ControlCounts {
   std::uint32_t raw = 0, psd = 0, ml = 0, rbf_pose = 0;
   std::uint32_t total() const { return raw + psd + ml + rbf_pose; }
@@ -26,19 +26,21 @@ std::uint16_t ml_joint_stride(const MlJoints& joints);
 
 namespace detail {
 
-/// Takes a layer out; its controls are still counted, as unread.
+/// Removes a layer. Its controls still count, as unread.
 /// In: id  of the layer, e.g. "mlbh"
 void drop_layer(std::string_view id, Dna& dna);
 
-/// Closes the gaps that unread controls leave, so that the value can be written as a file of its
-/// own. What an unread control drives goes with it (it would stay 0): columns of joint groups,
-/// entries of channels and maps, correctives with such a factor. Out: how many of these went.
-/// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control).
+/// Closes the gaps of unread controls, so that the Dna can be written as a file of its own.
+/// Everything that an unread control drives is removed, because it would stay 0: columns of joint
+/// groups, entries of channels and maps, and correctives with such a factor. Out: how many were
+/// removed
+/// Fails: kInvalidArgument (a network, a pose or a setup reads or writes an unread control)
 core::Result<std::size_t> forget_unread_controls(Dna& dna);
 
-/// The same for any controls: those that are not kept go, the others close the gaps. The caller
-/// sets the counts of the parts that lose some. In: keep  [controls], raw ones are all kept Fails:
-/// kInvalidArgument (a network, a pose or a setup reads or writes one that goes)
+/// The same for any controls: controls that are not kept are removed, and the others close the
+/// gaps. The caller sets the counts of the parts that lose controls.
+/// In: keep  [controls]; all raw controls are kept
+/// Fails: kInvalidArgument (a network, a pose or a setup reads or writes a removed control)
 core::Result<std::size_t> forget_controls(const std::vector<bool>& keep, Dna& dna);
 
 }  // namespace detail

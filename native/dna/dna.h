@@ -19,7 +19,7 @@ using core::List;
 using core::Vec2Array;
 using core::Vec3Array;
 
-/// For each LOD a list of indices; LODs may share a list. lods[lod] is a row of `rows`.
+/// A list of indices for each LOD; LODs may share a list. lods[lod] is a row of `rows`.
 struct LodMapping {
   Array<std::uint16_t> lods;
   std::vector<Array<std::uint16_t>> rows;
@@ -154,7 +154,7 @@ struct NeuralNetwork {
   bool operator==(const NeuralNetwork&) const = default;
 };
 
-/// Layer mlbh: controls that networks write.
+/// Layer mlbh: neural networks and the controls that they write.
 struct MachineLearnedBehavior {
   std::vector<std::string> ml_control_names;
   LodMapping lod_neural_network_mapping;
@@ -224,7 +224,7 @@ struct RbfBehavior {
   bool operator==(const RbfBehavior&) const = default;
 };
 
-/// What a pose of layer rbfb writes: weights times its value times the input controls.
+/// The outputs of a pose of layer rbfb: weights times the pose's value times the input controls.
 struct RbfPoseControls {
   Array<std::uint16_t> input_control_indices, output_control_indices;
   Array<float> output_control_weights;
@@ -273,23 +273,23 @@ struct UnknownLayer {
   bool operator==(const UnknownLayer&) const = default;
 };
 
-/// Something odd that could be read safely.
+/// An oddity of a file that does not prevent reading it.
 struct Warning {
   std::string where;
   std::string message;
-  std::optional<std::uint64_t> offset = std::nullopt;  // byte offset in the file, where it is known
+  std::optional<std::uint64_t> offset = std::nullopt;  // byte offset in the file, if known
   bool operator==(const Warning&) const = default;
 };
 
-/// How many controls the layers name that were not loaded: they keep their places in the control
-/// space raw | corrective | network | RBF pose.
+/// The number of controls in layers that were not loaded. These controls keep their places in the
+/// control space raw | corrective | network | RBF pose.
 struct UnreadControls {
   std::uint32_t psd = 0, ml = 0, rbf_pose = 0;
   bool operator==(const UnreadControls&) const = default;
 };
 
 struct Dna {
-  std::uint16_t generation = 2, version = 8;  // of the file it was read from
+  std::uint16_t generation = 2, version = 8;  // of the source file
   Descriptor descriptor;
   DescriptorExt descriptor_ext;
   Definition definition;
@@ -303,8 +303,8 @@ struct Dna {
   TwistSwingBehavior twist_swing_behavior;
   UnreadControls unread_controls;
   std::vector<UnknownLayer> unknown_layers;
-  /// Ids as the file listed them, for a rewrite in that order; "" is the next unknown layer's
-  /// place.
+  /// Layer ids in the order of the source file, so that a rewrite keeps it; "" stands for the next
+  /// unknown layer.
   std::vector<std::string> index_order;
   std::vector<Warning> warnings;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What leaving some elements out does to the indices of the others.
+// Renumbers indices when some elements are removed.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace risorius::dna::detail {
 
-/// Old index -> new index, where it is kept.
+/// Old index -> new index; kDropped for removed elements.
 class IndexMap {
  public:
   static constexpr std::uint32_t kDropped = 0xFFFFFFFF;
@@ -31,8 +31,8 @@ class IndexMap {
   std::size_t kept_ = 0;
 };
 
-/// Rows [0, lods[l]) are used at LOD l: dropping row r lowers every count above it. Each row is
-/// looked at once, of however many entries lods is.
+/// Rows [0, lods[l]) are used at LOD l, so that dropping row r lowers every larger count. Each row
+/// is visited once, independent of the number of LODs.
 template <class Keep>
 void drop_rows(const Keep& keep, core::Array<std::uint16_t>& lods) {
   std::vector<std::uint16_t> kept_before{0};

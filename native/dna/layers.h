@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The table of layers that the format knows, in the order in which a writer appends them.
+// The table of the format's layers, in the order in which a writer appends them.
 #pragma once
 
 #include <array>
@@ -15,7 +15,7 @@ using LayerId = std::array<char, 4>;
 struct KnownLayer {
   char id[5];
   std::uint32_t version;      // major << 16 | minor
-  std::uint16_t since_minor;  // first file version 2.<minor> that has it
+  std::uint16_t since_minor;  // first file version 2.<minor> with the layer
 };
 
 inline constexpr KnownLayer kLayers[] = {
@@ -26,7 +26,7 @@ inline constexpr KnownLayer kLayers[] = {
 
 /// A layer is known by the exact pair of id and version.
 /// In:  version  major << 16 | minor
-/// Out: nullptr where the pair is not known
+/// Out: nullptr if the pair is unknown
 inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
   for (const KnownLayer& layer : kLayers) {
     if (std::memcmp(layer.id, id.data(), 4) == 0 && layer.version == version) return &layer;
@@ -35,7 +35,7 @@ inline const KnownLayer* find_layer(const LayerId& id, std::uint32_t version) {
 }
 
 /// Calls f(id, field name, struct) for each layer that has a struct in Dna, in the table's order.
-/// dsce comes last: its bytes depend on the file's version.
+/// dsce comes last, because its bytes depend on the file's version.
 template <class D, class F>
 void for_each_layer(D& dna, F f) {
   f("desc", "descriptor", dna.descriptor);

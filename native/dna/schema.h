@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: MIT
-// The format, written down once: which fields a layer has, in the order of its bytes. Reading,
-// writing, JSON and the sizes of empty layers are visitors of these functions. Private to
-// native/dna.
+// The format in one place: the fields of each layer, in the order of their bytes. Reading, writing,
+// JSON and the sizes of empty layers are visitors of these functions. Private to native/dna.
 //
 // A visitor has
 //   field(name, value)              numbers, texts, Arrays, lists of them, structs with a describe
-//   group(name, body)               a struct of the format that Dna does not have; only JSON nests
+// group(name, body)               a struct of the format that Dna lacks; only JSON nests it
+//   group(name, body)               a struct of the format that Dna lacks; only JSON nests it
 //   sized(name, list, mapping)      a list whose elements are preceded by their size; mapping tells
-//                                   which of them a LOD needs, or is null
-//   matrix(name, group)             a joint group's values
+//                                   which elements a LOD needs, or is null
 //   faces(mesh), skin(mesh), targets(mesh)   lists that Dna keeps flat, or that a LOD may drop
 //   setups(name, list, twist)       lists of describe_setup
 #pragma once
@@ -19,8 +18,8 @@
 
 namespace risorius::dna::detail {
 
-/// A field's name in Dna (error messages) and, where it is not the same words in camelCase, in the
-/// format's JSON.
+/// A field's name in Dna (for error messages) and in the format's JSON, if that is not the same
+/// name in camelCase.
 struct Name {
   const char* dna;
   const char* json = nullptr;
@@ -61,7 +60,7 @@ void describe(V& v, D& d) {
   v.field("db_name", d.db_name);
 }
 
-/// The winding order, from 2.8 on, is the container's business: it depends on the file's version.
+/// The container handles the winding order (from 2.8 on), because it depends on the file's version.
 template <class V, Of<DescriptorExt> D>
 void describe(V& v, D& d) {
   v.field("rotation_sequence", d.rotation_sequence);
@@ -305,7 +304,7 @@ void describe(V& v, D& d) {
   v.setups("swings", d.swings, false);
 }
 
-/// A twist or swing: the same bytes under other names in JSON.
+/// A twist or swing: the same bytes, with different names in JSON.
 template <class V, Of<TwistSwingSetup> D>
 void describe_setup(V& v, D& d, bool twist) {
   v.field({"blend_weights", twist ? "twistBlendWeights" : "swingBlendWeights"}, d.blend_weights);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How large a Dna is: what the stages behind the parser are held against.
+// The size of a Dna, by which the limits of later stages are set.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace risorius::dna {
 
-/// Bytes of its numbers and texts, with the counts of its lists, as a file has them; without the
-/// container around the layers. Cost: one look at each list.
+/// Bytes of its numbers and texts, with the counts of its lists, as in a file; without the
+/// container around the layers. Cost: visits each list once
 std::uint64_t size_in_bytes(const Dna& dna);
 
 }  // namespace risorius::dna

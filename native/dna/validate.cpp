@@ -20,7 +20,7 @@ using core::ok;
 using core::Status;
 using detail::Where;
 
-constexpr std::size_t kMostFindings = 1000;  // a broken file repeats itself
+constexpr std::size_t kMostFindings = 1000;  // a broken file repeats its errors
 
 template <class T>
 T largest(const Array<T>& values) {
@@ -29,7 +29,7 @@ T largest(const Array<T>& values) {
   return top;
 }
 
-// Collects what is wrong and what is odd, one finding per list.
+// Collects errors and oddities, one finding per list.
 class Checker {
  public:
   explicit Checker(detail::Known known) : known_(known) {}
@@ -110,7 +110,7 @@ class Checker {
   struct Odd {
     std::size_t first = 0, count = 0;
   };
-  /// Which of so many is_odd says, the first and how many.
+  /// The first index below size for which is_odd is true, and how many there are.
   template <class IsOdd>
   static Odd find_odd(std::size_t size, const IsOdd& is_odd) {
     Odd out;
@@ -162,7 +162,7 @@ void check_descriptor(Checker& c, const Dna& dna) {
 }
 
 void check_hierarchy(Checker& c, const Array<std::uint16_t>& parents) {
-  // Walk up from each joint until a joint that is known to reach a root.
+  // Walk up from each joint to a joint that is known to reach a root.
   std::vector<std::uint8_t> good(parents.size(), 0);
   std::vector<std::size_t> path;
   for (std::size_t j = 0; j < parents.size(); ++j) {
@@ -536,7 +536,7 @@ void check_setups(Checker& c, const Where& name, const List<TwistSwingSetup>& se
 void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_descriptor(c, dna);
   check_definition(c, dna);
-  // Without a definition there are no spaces to check against: a descriptor-only load.
+  // Without a definition (a descriptor-only load) there are no sizes to check indices against.
   if (dna.behavior != Behavior{}) check_behavior(c, dna);
   if (geometry) check_geometry(c, dna);
   check_networks(c, dna);
@@ -547,7 +547,7 @@ void check_layers(Checker& c, const Dna& dna, bool geometry) {
   check_setups(c, "twist_swing_behavior.swings", dna.twist_swing_behavior.swings, dna);
 }
 
-// The first error, or warnings.
+// The first error, or the warnings.
 Status told(std::vector<Finding> findings, std::vector<Warning>& warnings) {
   for (Finding& f : findings) {
     if (f.is_error) return core::Unexpected{std::move(f.error)};

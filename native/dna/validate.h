@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The check of a Dna: lists of one length, indices inside their space.
+// Checks a Dna: parallel lists have one length, indices are in range.
 #pragma once
 
 #include <vector>
@@ -9,32 +9,33 @@
 
 namespace risorius::dna {
 
-/// One thing that is wrong (an error: the file is refused) or odd (a warning).
+/// An error (the file is refused) or an oddity (a warning).
 struct Finding {
   bool is_error = false;
   core::Error error;  // code of a warning: kInvalidValue
 };
 
-/// Checks that lists that belong together have one length, that every index is in its space, that
-/// the joint hierarchy has no cycle and LOD rows fit their matrix. Appends oddities that can be
-/// read safely to warnings.
-/// Fails: kInvalidLength, kInvalidIndex, kInvalidValue, with the field and no offset.
+/// Checks that parallel lists have one length, that every index is in range, that the joint
+/// hierarchy has no cycle, and that LOD rows fit their matrix.
+/// In/out: warnings  gets the oddities that can be read safely
+/// Fails: kInvalidLength, kInvalidIndex, kInvalidValue, with the field and no offset
 core::Status validate(const Dna& dna, std::vector<Warning>& warnings);
-/// The same of everything but the geometry: what evaluation reads.
+/// The same without the geometry: everything that evaluation reads.
 core::Status validate_behavior(const Dna& dna, std::vector<Warning>& warnings);
 
 namespace detail {
 
-/// What was seen while the numbers were read and need not be looked for again.
+/// Facts that reading the numbers established, so that they need no second check.
 struct Known {
-  bool finite = false;          // every element of every Array<float>
-  bool vertex_indices = false;  // those of blend shape targets are below their mesh's vertex count
+  bool finite = false;  // every element of every Array<float>
+  // Vertex indices of blend shape targets are below their mesh's vertex count.
+  bool vertex_indices = false;
 };
 
-/// validate, but every error and not only the first.
+/// Like validate, but returns every error.
 std::vector<Finding> find_all(const Dna& dna, Known known = {});
 
-/// The validate() above, without looking again for what is known.
+/// The validate() above without the checks that `known` makes unnecessary.
 core::Status validate(const Dna& dna, Known known, std::vector<Warning>& warnings);
 
 }  // namespace detail

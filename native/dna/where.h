@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The name of a field, put together only when there is something to say about it.
+// The name of a field, which becomes text only if there is an error.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace risorius::dna::detail {
 
-/// "geometry.meshes[3].positions[7]" as a few pointers: whoever checks thousands of lists names
-/// each and makes text of none. In: names that live as long as the program.
+/// "geometry.meshes[3].positions[7]" as a few pointers: a check names thousands of lists and rarely
+/// makes text of one. In: names that live as long as the program
 class Where {
  public:
   Where(const char* name) { add({name, kNone}); }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dense groups of units.
+// Builds dense joint groups from units.
 #include <algorithm>
 #include <functional>
 #include <map>
@@ -18,23 +18,23 @@ using core::ErrorCode;
 using core::Result;
 using Indices = std::vector<std::uint16_t>;
 
-// Values that a reader with the usual limits takes for one list.
+// The most values that a reader with the default limits accepts in one list.
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 28;
 constexpr std::size_t kMost = 65535;  // rows or columns
 
-// Groups in the order in which they are written: later ones win.
+// The key of a new group. Groups are written in ascending order of keys, because later rows win.
 struct GroupKey {
-  std::uint32_t below;  // the higher the layer, the earlier
-  // levels: where units of one order cannot share a group, those of equal LODs do; else 0. The
-  // bundle's group has no region.
+  std::uint32_t below;  // higher layers come first
+  // levels: number of LODs, set only if units of one order cannot share a group; else 0. The group
+  // of a bundle has no region.
   std::uint32_t region, chain, bundle, order, levels;
   auto operator<=>(const GroupKey&) const = default;
 };
 using Members = std::map<GroupKey, std::vector<const Unit*>>;
 
-// The columns of a group and where each unit's columns are among them. Those that turn quaternions
-// stand as they are multiplied (compile::quaternion_column_order leaves them there), then the
-// others.
+// The columns of a group, and the place of each unit's columns among them. Columns that turn
+// quaternions come first, in the order of their product (compile::quaternion_column_order keeps
+// it).
 class Columns {
  public:
   explicit Columns(const std::vector<const Unit*>& units) {
@@ -80,14 +80,14 @@ class Columns {
     }
   }
 
-  // LODs at which each column turns a quaternion.
+  // Number of LODs at which each column turns a quaternion.
   std::vector<std::uint32_t> levels_of(const std::vector<const Unit*>& units) const {
     std::vector<std::uint32_t> levels(controls_.size(), 0);
     for (const Unit* u : units) {
       if (u->order == kAnyOrder) continue;
       for (std::size_t c = 0; c < u->columns.size(); ++c) {
         std::uint32_t& to = levels[place(*u, c)];
-        to = std::max(to, u->rows[0].levels);  // all rows have as many, but in bundles
+        to = std::max(to, u->rows[0].levels);  // outside of bundles all rows have the same number
       }
     }
     return levels;
@@ -119,9 +119,9 @@ class Columns {
   bool keeps_orders_ = true;
 };
 
-// Quaternions of one group share the order of its columns, in which those of more LODs come first.
-// Where that is not the order of one of them, those whose rows have equal LODs keep theirs: all
-// their columns have as many.
+// The quaternions of one group share the order of its columns, in which columns of more LODs come
+// first. If that changes the order of one of them, units with equal LODs get a group of their own:
+// there all columns have the same number of LODs.
 Members separated(const Members& groups) {
   Members out;
   for (const auto& [key, list] : groups) {
@@ -147,7 +147,7 @@ Members list_members(const std::vector<Unit>& units, const Regions& regions) {
     if (u.order != kAnyOrder) out[key(u, u.order)].push_back(&u);
   }
   out = separated(out);
-  // What may stand in any order joins what may not, if there is something.
+  // Units that may stand in any order join a group with a fixed order, if there is one.
   Members free;
   for (const Unit& u : units) {
     if (u.order == kAnyOrder) free[key(u, kAnyOrder)].push_back(&u);
@@ -169,7 +169,7 @@ struct Placed {
   const Row& at() const { return unit->rows[row]; }
 };
 
-// What coarser LODs use comes first.
+// Rows of more LODs come first.
 std::vector<Placed> order_rows(const std::vector<const Unit*>& units) {
   std::vector<Placed> rows;
   for (const Unit* u : units) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an edit did to the poses of a face, and to the time that they take.
+// Compares the poses and the evaluation times of a face before and after an edit.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -23,9 +23,9 @@ using core::Result;
 using Frames = std::vector<float>;  // [frames, raw controls]
 
 constexpr std::uint32_t kMostActive = 40;  // controls of a random pose
-constexpr std::size_t kFrames = 32;        // evaluated together
+constexpr std::size_t kFrames = 32;        // evaluated in one call
 
-// The same numbers everywhere, as the distributions of the standard library are not.
+// Gives the same numbers on every platform, unlike the distributions of the standard library.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}
@@ -50,7 +50,7 @@ Frames random_frames(const rig::Rig& rig, std::uint32_t count, std::uint64_t see
   return out;
 }
 
-// Each raw control at 1 and the others at rest, then the random ones.
+// Each raw control alone at 1, then the random poses.
 Frames all_frames(const rig::Rig& rig, const RegroupOptions& options) {
   Frames out;
   for (std::uint32_t c = 0; c < rig.raw_count; ++c) {
@@ -63,7 +63,7 @@ Frames all_frames(const rig::Rig& rig, const RegroupOptions& options) {
   return out;
 }
 
-// translation, rotation, scale, position
+// Of translation, rotation, scale and position.
 struct Worst {
   double value = 0.0;
   std::size_t joint = 0, frame = 0;
@@ -79,7 +79,7 @@ double length(const Vector& a, const Vector& b) {
   return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
-// Evaluates both rigs, a few frames at a time, and keeps the largest differences.
+// Evaluates both rigs in blocks of frames and keeps the largest differences.
 class Comparison {
  public:
   Comparison(const Skeleton& skeleton, const rig::Rig& before, const rig::Rig& after)
@@ -122,7 +122,7 @@ class Comparison {
       for (std::size_t side = 0; side < 2; ++side) {
         locals_[side][j] = skeleton_.local(j, pose[side] + 9 * j);
       }
-      // The same bits move nothing, whatever numbers they are.
+      // Equal bits move nothing, even if they are NaN.
       // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
       if (!std::memcmp(pose[0] + 9 * j, pose[1] + 9 * j, 9 * sizeof(float))) continue;
       const Local &a = locals_[0][j], &b = locals_[1][j];
@@ -194,8 +194,8 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-// In turns, and each goes first as often as the other: whatever else the machine does, and what the
-// first of two finds cold, meets both.
+// The faces take turns, and each goes first equally often: the load of the machine and the cold
+// caches of the first evaluation then meet both.
 core::Status measure_times(const dna::Dna& before, const dna::Dna& after,
                            const RegroupOptions& options, RegroupReport& report) {
   if (options.timed == 0) return core::ok();

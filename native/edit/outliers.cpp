@@ -8,7 +8,7 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// How often each LOD uses the correctives that must stay in use where they are.
+// Counts the uses of each watched corrective at each LOD.
 class Uses {
  public:
   Uses(const dna::Dna& dna, const std::vector<Unit>& units)
@@ -19,14 +19,15 @@ class Uses {
     const auto& maps = dna.behavior.animated_maps;
     count_entries(channels.lods, channels.input_indices);
     count_entries(maps.lods, maps.conditionals.input_indices);
-    // Joints of networks use theirs as well; to leave them out only keeps more.
+    // Joints of neural networks use correctives too. Not counting them only keeps more
+    // coefficients.
     for (const Unit& u : units) {
       for (std::size_t v = 0; v < u.values.size(); ++v) {
         if (u.values[v] != 0.0f) add(u.columns[v % u.columns.size()], row_of(u, v), 1);
       }
     }
   }
-  /// False where that was the last use at some LOD.
+  /// False if that was the last use at some LOD.
   bool take(std::uint16_t control, const Row& row) {
     if (!watched_[control]) return true;
     for (std::uint32_t l = 0; l < lods_; ++l) {
@@ -62,7 +63,7 @@ class Uses {
   std::vector<std::int64_t> counts_;  // [controls, LODs]
 };
 
-// How many joints of a region each control moves.
+// The number of joints of a region that each control moves.
 std::vector<std::uint32_t> count_joints(const std::vector<const Unit*>& units,
                                         std::size_t controls) {
   std::vector<std::uint32_t> counts(controls, 0), last(controls, UINT32_MAX);
@@ -127,7 +128,8 @@ void remove_zero_rows(std::vector<Unit>& units) {
     while (i < units.size() && units[i].joint == units[begin].joint) ++i;
     const auto first = units.begin() + static_cast<std::ptrdiff_t>(begin);
     const auto last = units.begin() + static_cast<std::ptrdiff_t>(i);
-    // A row of zeros may be there to hide another, and a joint that has rows is the rig's.
+    // A row of zeros may hide another row. A joint keeps at least one row, because the rig then
+    // knows that it moves.
     const bool layered = std::any_of(first, last, [](const Unit& u) { return u.layer > 0; });
     const auto goes = [&](const Unit& u) { return u.is_zero() && !u.is_quaternion && !layered; };
     auto kept = std::count_if(first, last, [&](const Unit& u) { return !goes(u); });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Which joints come together: those that the same controls drive, so that a dense group of their
-// rows and those controls holds few zeros.
+// Groups joints that the same controls drive, so that a dense group of their rows and these
+// controls holds few zeros.
 #include <algorithm>
 #include <bit>
 #include <compare>
@@ -16,13 +16,13 @@ namespace risorius::edit::detail {
 
 namespace {
 
-// What a column of a group costs beside its rows, in rows. For the time of an evaluation that is
-// about 50 (measured with a noisy face in 1 and in 464 groups), for the size of the file 0; with
-// anything from 8 to 64 a full-scale face has the same groups.
+// Cost of a column beside its rows, in rows. For the evaluation time it is about 50 (measured with
+// a noisy face in 1 and in 464 groups), for the file size 0. Any value from 8 to 64 gives a
+// full-scale face the same groups.
 constexpr std::int64_t kColumnOverhead = 8;
-// Joints that have little in common would make a heap of groups, which is slow.
+// Joints that share few controls would end in many small groups, which are slow to evaluate.
 constexpr std::size_t kJointsOfGroup = 14, kFewGroups = 16;
-constexpr std::int64_t kMostRows = 65535;  // that a LOD of a group can count
+constexpr std::int64_t kMostRows = 65535;  // the format counts rows of a LOD in 16 bits
 
 struct Cluster {
   std::vector<std::uint64_t> controls;  // as bits
@@ -43,7 +43,7 @@ std::int64_t columns_of_both(const Cluster& a, const Cluster& b) {
   return n;
 }
 
-// How good a merge is; less is better. The distance decides between equals.
+// The gain of a merge; a smaller change is better. The distance decides between equal changes.
 struct Merge {
   std::int64_t change = 0;
   double distance = 0.0;
@@ -75,8 +75,8 @@ void join(Cluster& a, Cluster& b) {
   b = {};
 }
 
-// Merges the best pair as long as that makes the whole smaller or there are too many. Each cluster
-// knows its best partner among those after it.
+// Merges the best pair while that lowers the total cost or there are too many groups. Each cluster
+// knows its best partner among the clusters after it.
 class Clustering {
  public:
   explicit Clustering(std::vector<Cluster>& clusters)
@@ -120,11 +120,11 @@ class Clustering {
   std::size_t count_;
 };
 
-// The strongest effect of each control on a joint.
+// The strongest effect of each control on one joint.
 using Strengths = std::map<std::uint16_t, double>;
 
-// Of what drives a joint: everything, or what is not small. Where most is small (a faint
-// expression's joints, a threshold too high) the stronger half must say where the joint belongs.
+// The strength below which a control does not count for a joint. If most of its controls are weak
+// (a faint expression, a threshold that is too high), the stronger half decides the joint's region.
 double least_strength(const Strengths& strengths, bool significant_only) {
   if (!significant_only || strengths.empty()) return 0.0;
   std::vector<double> all;
@@ -135,7 +135,8 @@ double least_strength(const Strengths& strengths, bool significant_only) {
 }
 
 std::vector<Vector> neutral_positions(const dna::Dna& dna) {
-  // Only distances are compared, and only between equals: plain xyz angles in degrees would do.
+  // Only distances of candidates with equal cost are compared: xyz angles in degrees are exact
+  // enough.
   rig::EulerConvention euler;
   if (dna.descriptor.rotation_unit != 1) euler.radians_per_unit = 0.0174532925199432958f;
   const Skeleton skeleton(dna, euler);
@@ -150,7 +151,7 @@ std::vector<Vector> neutral_positions(const dna::Dna& dna) {
   return positions;
 }
 
-// A cluster of each joint that no region lists.
+// One cluster for each joint that no given region lists.
 std::vector<Cluster> list_clusters(const dna::Dna& dna, std::span<const Unit> units,
                                    const Effects& effects, bool significant_only,
                                    const std::vector<std::uint32_t>& of_joint) {
@@ -182,7 +183,7 @@ std::vector<Cluster> list_clusters(const dna::Dna& dna, std::span<const Unit> un
   return out;
 }
 
-// Controls that drive none of the joints take no words.
+// Drops the bits of controls that drive none of the joints.
 void pack_controls(std::vector<Cluster>& clusters) {
   if (clusters.empty()) return;
   const std::size_t words = clusters[0].controls.size();
@@ -222,7 +223,7 @@ Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const 
     for (const std::uint32_t joint : cluster.joints) wanted[joint] = next;
     ++next;
   }
-  // In the order of their first joints; those that nothing moves have none.
+  // Numbers the regions in the order of their first joints; joints that no unit moves have none.
   Regions out{std::vector<std::uint32_t>(wanted.size(), kNoRegion), 0};
   std::vector<std::uint32_t> number(next, kNoRegion);
   for (const Unit& u : units) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Joint groups made anew: dense blocks of the joints that the same controls drive.
+// Rebuilds joint groups as dense blocks of joints that the same controls drive.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace risorius::edit {
 
-/// Effects of a coefficient while its control is 1. One that is below is small, 0 makes none small.
+/// Effects of a coefficient while its control is 1. A smaller effect counts as small; 0: none does.
 struct Threshold {
   double translation_mm = 0.0;
   double rotation_degrees = 0.0;
@@ -19,43 +19,44 @@ struct Threshold {
 };
 
 struct RegroupOptions {
-  /// Joints of each region. Joints that no region lists, and all where there are none, come
-  /// together by what drives them.
+  /// Joints of each region. Joints that no region lists are grouped by the controls that drive
+  /// them.
   std::vector<std::vector<std::uint16_t>> regions;
   Threshold threshold;
-  /// A column is foreign to a region where it moves no more than this share of its joints.
+  /// A column is foreign to a region if it moves at most this share of the region's joints.
   double foreign_share = 0.25;
-  std::uint32_t combinations = 200;  // random poses that are compared, beside the single ones
-  std::uint64_t seed = 0;            // of the random poses
-  std::uint32_t timed = 1000;        // evaluations that are timed, 0: none
+  // Random poses that are compared, in addition to the single controls.
+  std::uint32_t combinations = 200;
+  std::uint64_t seed = 0;      // of the random poses
+  std::uint32_t timed = 1000;  // evaluations that are timed; 0: none
 };
 
 struct GroupSizes {
   std::uint64_t groups = 0, rows = 0;
-  std::uint64_t coefficients = 0;  // stored, zeros too
+  std::uint64_t coefficients = 0;  // stored, zeros included
   std::uint64_t nonzero = 0;
 };
 
-/// The largest difference of one kind between two rigs, and where it was.
+/// The largest difference of one kind between two rigs, and its place.
 struct LargestChange {
   double value = 0.0;
-  std::string joint;       // "" where nothing differs
+  std::string joint;       // "" if nothing differs
   std::string expression;  // a raw control, or "combination 17"
   std::uint32_t lod = 0;
 };
 
 struct Changes {
-  LargestChange translation_mm;    // of a joint against its parent
-  LargestChange rotation_degrees;  // of a joint against its parent
+  LargestChange translation_mm;    // of a joint relative to its parent
+  LargestChange rotation_degrees;  // of a joint relative to its parent
   LargestChange scale;
-  LargestChange position_mm;  // of a joint in the face, with what its ancestors do to it
+  LargestChange position_mm;  // of a joint in the face, including the effects of its ancestors
   std::uint32_t expressions = 0, combinations = 0;
 };
 
 struct RegroupReport {
   GroupSizes before, after;
-  std::vector<std::vector<std::uint16_t>> regions;  // joints of each, of those that groups move
-  std::uint64_t removed = 0;                        // coefficients other than 0 that were taken out
+  std::vector<std::vector<std::uint16_t>> regions;  // joints of each region that joint groups move
+  std::uint64_t removed = 0;                        // coefficients other than 0 that were removed
   Changes changes;
   double microseconds_before = 0.0, microseconds_after = 0.0;  // of an evaluation, median
 };
@@ -65,19 +66,19 @@ struct Regrouped {
   RegroupReport report;
 };
 
-/// The same face with other joint groups, however they were stored: joints are put into regions,
-/// each region's rows and the controls that move it make one dense group, rows that coarser LODs
-/// use come first. Coefficients that are small in a column foreign to their region are taken out
-/// and nothing else is: with a threshold of 0 the function stays as it was, to the order of sums
-/// (on the scalar path, to the last bit). A row is used at the LODs where it was.
+/// Rebuilds the joint groups of a face. Joints are put into regions; the rows of a region and the
+/// controls that move it make one dense group, in which rows of more LODs come first. Small
+/// coefficients in columns foreign to their region are removed. With a threshold of 0 the poses
+/// stay the same, except for the order of sums (on the scalar path, to the last bit). Each row is
+/// used at the same LODs as before.
 ///
-/// Joints that are turned by quaternions keep every coefficient and the order of their product.
-/// Where several groups write a row, or LODs do not nest, or columns of quaternions have an
-/// order that others cannot share, a region has several groups. A corrective that other things
-/// read as well stays in use at each LOD where it was.
+/// Joints that quaternions turn keep every coefficient and the order of their product. A region
+/// gets several groups if several groups write one row, if LODs do not nest, or if columns of
+/// quaternions need different orders. A corrective that other parts of the rig read stays in use at
+/// each LOD where it is used.
 ///
-/// Fails: kInvalidArgument, kInvalidIndex (regions, options), kLimitExceeded (regions whose dense
-///        groups do not fit the format), and as validate and compile.
+/// Fails: kInvalidArgument, kInvalidIndex (regions, options), kLimitExceeded (the dense groups of a
+///        region do not fit the format), and as validate and compile.
 /// Cost:  clustering grows with the square of the number of joints times the controls
 core::Result<Regrouped> regroup(const dna::Dna& dna, const RegroupOptions& options = {});
 

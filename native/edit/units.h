@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The rows of all joint groups, freed from their groups. Private to native/edit.
+// The rows of all joint groups as single units. Private to native/edit.
 #pragma once
 
 #include <cstdint>
@@ -10,45 +10,49 @@
 
 namespace risorius::edit::detail {
 
-/// Where a row came from; that tells the LODs that use it.
+/// The source of a row, which decides the LODs that use it.
 struct Row {
   std::uint16_t output = 0;  // joint * 9 + attribute
   std::uint32_t group = 0, row = 0;
-  std::uint32_t levels = 0;  // number of LODs that use it, more than 0
+  std::uint32_t levels = 0;  // number of LODs that use it, at least 1
 };
 
-/// How the columns of a unit are multiplied: in any order, in ascending order, or as in source
-/// group order - kOfGroup.
+/// The order in which a unit's columns are multiplied: any, ascending, or the order of source group
+/// `order - kOfGroup`.
 constexpr std::uint32_t kAnyOrder = 0, kAscending = 1, kOfGroup = 2;
 
-/// Rows that stay together: one, or those that turn one quaternion joint.
+/// Rows that stay together: a single row, or the rows that turn one quaternion joint.
 struct Unit {
   std::uint32_t joint = 0;
-  bool is_quaternion = false;  // the joint's: nothing of it is ever small
-  std::uint32_t layer = 0;     // units in later groups that write the same rows
-  std::uint32_t chain = 0;     // LODs of units of one chain nest in each other
+  // The joint is a quaternion joint; none of its coefficients counts as small.
+  bool is_quaternion = false;
+  std::uint32_t layer = 0;  // number of units in later groups that write the same rows
+  std::uint32_t chain = 0;  // units of one chain have LODs that nest in each other
   std::uint32_t order = kAnyOrder;
-  // Units of one bundle stay in one group of their own, 0: none. Where rows of a quaternion come in
-  // at different LODs the order of its columns hangs on the other quaternions of its source group.
+  // Units of one bundle stay in a group of their own; 0: none. If rows of a quaternion begin at
+  // different LODs, the order of its columns depends on the other quaternions of the source group.
   std::uint32_t bundle = 0;
   std::vector<Row> rows;
-  std::vector<std::uint16_t> columns;  // controls; linear: ascending, each once
-  std::vector<std::uint32_t> source;   // kOfGroup: the columns' places in the order of their group
-  std::vector<float> values;           // [rows, columns]
+  std::vector<std::uint16_t> columns;  // controls; of a linear unit: ascending, each once
+  // kOfGroup: place of each column in the order of the source group.
+  std::vector<std::uint32_t> source;
+  std::vector<float> values;  // [rows, columns]
 
   bool is_zero() const { return columns.empty(); }
 };
 
-/// Every row that some LOD uses, by joint and then in the order of the file. Columns with no value
-/// are gone, a control that a group names twice is there once (but for quaternions). In: a Dna that
-/// compile accepts.
+/// Every row that some LOD uses, sorted by joint and then by its place in the file. Columns of
+/// zeros are dropped, and a control that a group names twice is merged (except for quaternions).
+/// In: a Dna that compile accepts
 std::vector<Unit> list_units(const dna::Dna& dna);
 
-/// The last writer of a row is in layer 0, the one before it in layer 1; the higher is written
-/// first. Units that others hide at every LOD go, unless they keep a corrective in use.
+/// The last unit that writes a row gets layer 0, the one before it layer 1; higher layers are
+/// written first. Units that others hide at every LOD are removed, unless they keep a corrective in
+/// use.
 void find_layers(const dna::Dna& dna, std::vector<Unit>& units);
 
-/// How much a coefficient does while its control is 1, against the threshold: below 1 is small.
+/// The effect of a coefficient while its control is 1, as a share of the threshold: below 1 is
+/// small.
 class Effects {
  public:
   Effects(const dna::Dna& dna, const Threshold& threshold);
@@ -61,26 +65,26 @@ class Effects {
   bool nothing_is_small_;
 };
 
-/// True for correctives that something else than joints, channels and maps reads: where nothing
-/// uses them they rest, and what reads them would see it.
+/// True for correctives that are read by something other than joints, channels and maps. If no LOD
+/// used such a corrective it would rest, and its readers would change.
 std::vector<bool> watched_correctives(const dna::Dna& dna);
 
-/// Which region each joint is in; kNoRegion for joints that no unit moves.
+/// The region of each joint; kNoRegion for joints that no unit moves.
 constexpr std::uint32_t kNoRegion = UINT32_MAX;
 struct Regions {
   std::vector<std::uint32_t> of_joint;
   std::uint32_t count = 0;
 };
 
-/// In: significant_only  leave out what is small when joints are compared
+/// In: significant_only  ignore small coefficients when joints are compared
 Regions find_regions(const dna::Dna& dna, const std::vector<Unit>& units, const Effects& effects,
                      const RegroupOptions& options, bool significant_only);
 
-/// Takes small coefficients out of columns foreign to their region. Out: how many.
+/// Removes small coefficients from columns foreign to their region. Out: how many
 std::uint64_t remove_outliers(const dna::Dna& dna, const Regions& regions, const Effects& effects,
                               double foreign_share, std::vector<Unit>& units);
 
-/// Rows of zeros go where the joint has another row. After find_layers.
+/// Removes rows of zeros of joints that have another row. Call it after find_layers.
 void remove_zero_rows(std::vector<Unit>& units);
 
 /// Fails: kLimitExceeded
@@ -88,7 +92,7 @@ core::Result<std::vector<dna::JointGroup>> build_groups(const dna::Dna& dna,
                                                         const std::vector<Unit>& units,
                                                         const Regions& regions);
 
-/// Differences and times of two faces that differ in their joint groups only.
+/// Differences and evaluation times of two faces that differ only in their joint groups.
 core::Status compare(const dna::Dna& before, const dna::Dna& after, const RegroupOptions& options,
                      RegroupReport& report);
 

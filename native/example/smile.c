@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * smile: a program with a face in it. It opens a DNA file, moves one control from rest to full, at the
- * most and the least detailed level, and prints which joint, shape and map that moves most.
+ * smile: an example program with a face. It opens a DNA file, moves one control from rest to 1 at the
+ * most and at the least detailed LOD, and prints the joint, shape and map with the largest motion.
  *
  *     smile FILE.dna [CONTROL]
  */
@@ -19,7 +19,7 @@ static int complain(void) {
   return 1;
 }
 
-/* The raw control of this name or with this last part; else the first. */
+/* The raw control of this name or with this last part; otherwise the first one. */
 static uint32_t find_control(const risorius_face* face, const char* wanted) {
   const uint32_t count = risorius_count(face, RISORIUS_RAW_CONTROLS);
   for (uint32_t i = 0; wanted != NULL && i < count; ++i) {

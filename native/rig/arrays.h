@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// What a compiled face consists of: one header of plain numbers and about fifty arrays.
+// The contents of a compiled face: one header of plain numbers and about fifty arrays.
 //
 // compile() fills the arrays as std::vectors (RigData). make_rig() then copies them into one block
 // of bytes, and a Rig sees each array as a view into that block. Arrays refer to each other by
 // index and never by pointer, so the block can be written to a file and read again at another
 // address.
 //
-// Words: a *control* is one number of the control vector, which evaluation computes from the *raw
-// controls* that a caller sets; 0 is mostly rest and 1 full, as of a smile. A *GUI control* is a
-// slider of the rig's control panel: a table turns GUI controls into raw controls. What the vector
-// moves are *joint attributes*, each one of the 9 (or, with quaternions, 10) numbers of
-// translation, rotation and scale of a joint; *blend shape channels*, the weights of shapes that
-// meshes add to their neutral one; and *animated maps*, the weights of wrinkle and colour textures.
-// A *row* is a joint attribute as a joint group sees it: the group's own numbering. A *LOD* is a
-// level of detail, 0 the finest. A name that ends in "_begin" or "begins" is an index into another
-// array; where that array is not the next one, a comment names it.
+// Words: a *control* is one number of the control vector. Evaluation computes the vector from the
+// *raw controls* that a caller sets; for most controls 0 is rest and 1 is full, such as a full
+// smile. A *GUI control* is a slider of the rig's control panel: a table turns GUI controls into
+// raw controls. The vector moves *joint attributes*, the 9 (or, with quaternions, 10) numbers of
+// translation, rotation and scale of a joint; *blend shape channels*, the weights of the shapes
+// that meshes add to their neutral one; and *animated maps*, the weights of wrinkle and colour
+// textures. A *row* is a joint attribute in the numbering of a joint group. A *LOD* is a level of
+// detail; 0 is the finest. A name that ends in "_begin" or "begins" is an index into the array that
+// follows, or into the array that a comment names.
 #pragma once
 
 #include <array>
@@ -27,26 +27,26 @@
 
 namespace risorius::rig {
 
-/// One row of a conditional table. Where from <= in <= to holds for the input, the row adds
-/// slope * in + cut to the output.
+/// One row of a conditional table. If from <= in <= to holds for the input, the row adds slope * in
+/// + cut to the output.
 struct ConditionalRow {
   std::uint16_t input = 0, output = 0;
   float from = 0, to = 0, slope = 0, cut = 0;  // from <= to
-  // Neighbouring rows with the same input and output are a run, of which at most one row counts.
-  // This is the first row behind the run.
+  // Neighbouring rows with the same input and output form a run, of which at most one row counts.
+  // run_end is the first row behind the run.
   std::uint32_t run_end = 0;
 };
 
 /// A run of rows of a conditional table.
 struct RowRun {
   std::uint16_t input = 0;
-  std::uint16_t wakes = 0;  // 1: it adds something where its input is 0, so it is never passed over
+  std::uint16_t wakes = 0;  // 1: it adds something even if its input is 0, so it is never skipped
   std::uint32_t begin = 0;  // its first row
 };
 
-/// A corrective ("pose space deformation", hence Psd): a control that corrects what some controls
-/// give together, as lips that are pulled and pressed at once. It is min(1, weight * the product of
-/// its factors), where each factor is another control clamped to [0, 1].
+/// A corrective ("pose space deformation", hence Psd): a control that corrects the combined effect
+/// of several controls, such as lips that are pulled and pressed at once. Its value is min(1,
+/// weight * the product of its factors); each factor is another control clamped to [0, 1].
 struct Psd {
   std::uint16_t output = 0;         // the control that the corrective writes
   std::uint16_t factor_count = 0;   // number of factors
@@ -54,7 +54,7 @@ struct Psd {
   float weight = 1;
 };
 
-/// A corrective, as it is listed at the factor that watches it.
+/// An entry in the list of correctives that a factor watches.
 struct Watch {
   std::uint16_t psd = 0;    // the corrective, an index into psds
   std::uint16_t other = 0;  // the control of a second factor; with one factor, that factor again
@@ -69,30 +69,32 @@ struct Watch {
 struct JointGroup {
   std::uint32_t row_count = 0;
   std::uint32_t column_count = 0;  // columns that hold at least one value other than 0
-  // This group's first row among the rows of all groups. Groups of kWidest rows and more take whole
-  // vectors of rows: those behind the last one belong to nobody. Others lie side by side.
+  // The first row of this group among the rows of all groups. A group of kWidest rows or more takes
+  // whole vectors of rows, so that the rest of its last vector is unused. Smaller groups lie side
+  // by side.
   std::uint32_t rows_begin = 0;
   std::uint32_t columns_begin = 0;  // its first column in group_columns
   // The blocks of joint attributes that its rows reach at any LOD: see joint_pieces.
   std::uint32_t blocks_begin = 0, blocks_end = 0;
 };
 
-/// What one control, or all together, have in the joint groups of a LOD.
+/// The reads that one control, or all controls together, cause in the joint groups of a LOD.
 struct ControlReads {
   std::uint32_t values = 0;   // coefficients that an evaluation reads
-  std::uint32_t columns = 0;  // in that many columns
+  std::uint32_t columns = 0;  // the columns that hold these coefficients
 };
 
-/// One column of a joint group, as it is listed at its control: its first value in joint_values or
+/// One column of a joint group in the list of its control: its first value in joint_values or
 /// joint_halves, and the group, an index into joint_groups.
 using JointColumn = simd::Addend;
 
 /// A joint whose rotation in one joint group is a product of quaternions. Each column that turns
-/// the joint gives one factor: the blend of no rotation and the column's quaternion by the control.
+/// the joint gives one factor: a blend from no rotation to the column's quaternion, by the
+/// control's value.
 struct QuaternionJoint {
   std::uint32_t joint = 0;
   std::uint32_t group = 0;  // an index into joint_groups
-  // The joint's first rotation row in the group. A LOD that uses this many rows or fewer leaves the
+  // The joint's first rotation row in the group. A LOD with at most first_row rows leaves the
   // rotation out.
   std::uint32_t first_row = 0;
 };
@@ -110,26 +112,26 @@ struct QuaternionTerm {
   std::uint32_t slot = 0;  // the joint, an index into quaternion_joints
 };
 
-/// A radial basis function solver: it compares its input controls with the target of each of its
-/// poses, and the nearer a target, the more of the pose it gives.
+/// A radial basis function solver. It compares its input controls with the target of each of its
+/// poses; the nearer the target, the larger the weight of the pose.
 struct RbfSolver {
   double radius = 0;
-  float threshold = 0;  // a pose whose weight is not above it is left out
+  float threshold = 0;  // a pose is left out unless its weight is above the threshold
   std::uint32_t inputs_begin = 0, input_count = 0;  // its input controls in rbf_inputs
   std::uint32_t poses_begin = 0, pose_count = 0;    // its poses in rbf_poses
-  // The matrix [poses, inputs] of targets in rbf_targets. Where the distance looks at the swing or
-  // the twist of a rotation only, targets hold that part only.
+  // The matrix [poses, inputs] of targets in rbf_targets. If the distance compares only the swing
+  // or the twist of rotations, the targets hold only that part.
   std::uint32_t targets_begin = 0;
   std::uint32_t inverse_begin = 0;  // the matrix [poses, poses] in rbf_inverses, if interpolative
   std::uint32_t interpolative = 0;  // 1: at the target of a pose the solver gives that pose alone
-  // How distance is measured, how it becomes a weight, and about which axis a twist is: the numbers
-  // that the file uses, which stages/rbf.cpp reads.
+  // The distance, the function that turns a distance into a weight, and the axis of a twist, as the
+  // numbers of the file; stages/rbf.cpp reads them.
   std::uint32_t distance = 0, function = 0, axis = 0;
   std::uint32_t always_normalize = 0;  // 1: weights sum to 1 however small they are
 };
 
-/// A pose of a solver: to each output control it adds weight * value * the product of its inputs,
-/// where value is how much of the pose the solver gives.
+/// A pose of a solver. To each output control it adds weight * value * the product of its inputs;
+/// value is the weight that the solver gives the pose.
 struct RbfPose {
   std::uint32_t inputs_begin = 0, input_count = 0;    // controls in rbf_pose_inputs
   std::uint32_t outputs_begin = 0, output_count = 0;  // in rbf_outputs
@@ -143,21 +145,21 @@ struct RbfOutput {
 /// An index that refers to nothing.
 inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-/// An operation: one node of the graph of neural networks. What it computes are floats in the
-/// scratch memory of a Workspace (operation_values), where later operations read them.
+/// An operation: one node of the graph of neural networks. Its results are floats in the scratch
+/// memory of a Workspace (operation_values), where later operations read them.
 struct MlOperation {
   // kGather copies controls to values; kMlp runs a network (a multilayer perceptron); kWeightedSum
   // adds up values of others; kScatter copies values to controls.
   enum Kind : std::uint32_t { kGather = 1, kScatter = 2, kMlp = 3, kWeightedSum = 4 };
   std::uint32_t kind = kGather;
-  // The region whose mask switches the operation off: that of its network, or for kScatter that of
+  // The region whose mask switches the operation off: the region of its network, or for kScatter of
   // the network whose values it writes. kNone: no mask.
   std::uint32_t mask = kNone;
-  std::uint32_t values_begin = 0, value_count = 0;      // what it computes, in operation_values
-  std::uint32_t segments_begin = 0, segment_count = 0;  // what it reads, in ml_segments
+  std::uint32_t values_begin = 0, value_count = 0;      // its results, in operation_values
+  std::uint32_t segments_begin = 0, segment_count = 0;  // its inputs, in ml_segments
   std::uint32_t items_begin = 0, item_count = 0;        // in ml_controls, or ml_layers for kMlp
 };
-/// A run of values that another operation computed.
+/// A run of values that an earlier operation computed.
 struct MlSegment {
   std::uint32_t begin = 0, count = 0;  // in operation_values
   float weight = 1;
@@ -175,21 +177,21 @@ struct MlLayer {
   float alpha = 0;               // the slope of the leaky ReLU below 0
 };
 
-/// A joint that networks move, on top of what joint groups do to it.
+/// A joint that networks move, in addition to its joint groups.
 struct MlJoint {
   std::uint32_t joint = 0;
   std::uint32_t is_quaternion = 0;  // 1: the rotation is a quaternion, 0: Euler angles
-  // The controls that hold tx ty tz, x y z w (Euler angles have no w) and sx sy sz; kNone where the
+  // The controls that hold tx ty tz, x y z w (Euler angles have no w) and sx sy sz; kNone: the
   // attribute has no control.
   std::uint32_t controls[10] = {kNone, kNone, kNone, kNone, kNone,
                                 kNone, kNone, kNone, kNone, kNone};
 };
 
-/// A twist or swing setup. Four controls hold a rotation, which is a *twist* about an axis and a
-/// *swing* of that axis; joints get shares of the one or the other, as along a neck.
+/// A twist or swing setup. Four controls hold a rotation, which consists of a *twist* about an axis
+/// and a *swing* of that axis. Joints get shares of the one or the other, for example along a neck.
 struct TwistSwing {
-  // What shares are of: kTwist: the twist; kUntwist: its inverse; kSwing: the inverse of the swing,
-  // and each joint takes the whole inverse of the twist with it.
+  // The rotation of which joints get shares. kTwist: the twist; kUntwist: its inverse; kSwing: the
+  // inverse of the swing, and each joint also takes the whole inverse of the twist.
   enum Kind : std::uint32_t { kTwist, kUntwist, kSwing };
   std::uint32_t inputs[4] = {0, 0, 0, 0};  // the controls of x y z w
   std::uint32_t axis = 0;                  // of the twist: 0 x, 1 y, 2 z
@@ -207,7 +209,7 @@ struct GuiRange {
   std::uint32_t rows_begin = 0, rows_end = 0;  // in gui_range_rows
 };
 
-/// A step of an evaluation: what is to be done and on which element, packed into one number.
+/// A step of an evaluation: the kind of work and the index of its element, packed into one number.
 enum class StepKind : std::uint32_t { kOperation, kSolver, kPsd };
 constexpr std::uint32_t make_step(StepKind kind, std::uint32_t index) {
   return (static_cast<std::uint32_t>(kind) << 30) | index;
@@ -216,16 +218,16 @@ constexpr StepKind step_kind(std::uint32_t step) { return StepKind{step >> 30}; 
 /// An index into ml_operations, rbf_solvers or psds, by the kind of the step.
 constexpr std::uint32_t step_index(std::uint32_t step) { return step & 0x3FFFFFFFu; }
 
-/// Each LOD has these lists of steps. A *settled* evaluation (settle = true) orders everything by
-/// what it needs; a *latent* one follows the reference, whose stages have a fixed order.
+/// Each LOD has these lists of steps. A *settled* evaluation (settle = true) orders all steps by
+/// their dependencies; a *latent* one follows the reference, whose stages have a fixed order.
 enum StepList : std::uint32_t {
   // Settled: networks and solvers that need no corrective. They run before all correctives.
   kEarly,
   // Settled: the other networks and solvers, and the correctives that are not watched (see psds),
-  // each behind those that it reads. Latent: its correctives.
+  // each behind the steps that it reads. Latent: its correctives.
   kChained,
-  // What needs itself, directly or through others, and what needs that. A settled evaluation leaves
-  // it at rest; a latent one runs its correctives.
+  // Steps that depend on themselves, directly or through others, and the steps that depend on them.
+  // A settled evaluation leaves them at rest; a latent one runs their correctives.
   kCyclic,
   // Latent: networks and then solvers, in the order of the file.
   kReference,
@@ -242,12 +244,14 @@ struct RigHeader {
   std::uint32_t widest_layer = 0;      // rows of the largest layer of a network
   std::uint32_t solver_inputs = 0, solver_poses = 0;  // of the largest solver
   std::uint32_t mask_count = 0;                       // regions of networks
-  // So many leading channels follow each other, as do their controls: one copy serves them all.
+  // The number of leading channels whose indices and controls are consecutive: one copy serves
+  // them.
   std::uint32_t shape_run = 0;
   std::uint32_t joint_stride = 9;  // attributes of a joint; with quaternions 10
   EulerConvention euler;
-  // Networks may move joints in another system of axes than the face's. Then ml_converted is 1,
-  // v * ml_basis takes a vector of theirs into ours, and ml_euler says how they spell Euler angles.
+  // Networks may move joints in axes other than the face's. Then ml_converted is 1, v * ml_basis
+  // takes a vector from the networks' axes to the face's, and ml_euler is their convention of Euler
+  // angles.
   std::uint32_t ml_converted = 0;
   EulerConvention ml_euler;
   float ml_basis[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -262,16 +266,16 @@ struct RigArrays {
 
   A<float> neutral_joints;    // [joints, joint_stride]; the scale is 1
   A<float> initial_controls;  // [controls]: the control vector at rest
-  // The table from GUI controls to raw controls, and the same rows sorted for the way back:
-  // ranges by GUI control, in the order of their first rows.
+  // The table from GUI controls to raw controls, and the same rows sorted for the inverse: ranges
+  // by GUI control, in the order of their first rows.
   A<ConditionalRow> gui_rows;
   A<GuiRange> gui_ranges;
   A<std::uint32_t> gui_range_rows;  // indices into gui_rows
 
-  // Correctives. Most rest at 0, and evaluation should not look at those. A corrective whose
-  // factors all have their values before the first corrective is computed is *watched*: it is
-  // listed at one of its factors, the one with the fewest correctives listed. While that factor is
-  // 0 the corrective is 0, and evaluation passes it over without a look.
+  // Correctives. Most rest at 0, and evaluation should not read these. A corrective is *watched* if
+  // all of its factors have their values before the first corrective is computed: it is listed at
+  // one of its factors, the one with the shortest list. While that factor is 0 the corrective is 0,
+  // and evaluation does not visit it.
   A<Psd> psds;                    // in the order of their watchers; no two have the same output
   A<std::uint16_t> psd_factors;   // controls
   A<std::uint32_t> watch_begins;  // [LODs, controls + 1]: where each control's list begins
@@ -281,38 +285,38 @@ struct RigArrays {
   A<std::uint32_t> step_begins;
   A<std::uint32_t> steps;
 
-  // Joint groups. The groups that coarse LODs use come first, so a LOD needs the first
-  // live_groups[lod] groups only; and of each group the first joint_group_lods[group, lod] rows.
+  // Joint groups. The groups that coarse LODs use come first, so that a LOD needs only the first
+  // live_groups[lod] groups, and only the first joint_group_lods[group, lod] rows of each group.
   A<JointGroup> joint_groups;
   A<std::uint32_t> live_groups;       // [LODs]
   A<std::uint32_t> joint_group_lods;  // [groups, LODs]
   A<float> joint_values;              // the columns as float32 ...
   A<std::uint16_t> joint_halves;      // ... or as float16; one of the two arrays is empty
   A<std::uint16_t> joint_outputs;     // [rows of all groups]: the joint attribute of each row
-  // How the rows reach their joint attributes. The attributes are cut into blocks of 16; for each
-  // block of each LOD one piece tells which attributes take values and where these begin in the
-  // rows. Attributes of a block whose rows lie elsewhere have extra pieces.
+  // The way from rows to joint attributes. The attributes are cut into blocks of 16. For each block
+  // of each LOD one piece tells which attributes take values and where these values begin in the
+  // rows. Attributes whose rows lie elsewhere have extra pieces.
   A<simd::Piece> joint_pieces;    // [LODs, blocks]
   A<std::uint32_t> extra_begins;  // [LODs + 1]
   A<simd::Piece> extra_pieces;
   A<std::uint32_t> joint_column_begins;  // [controls + 1]: where each control's columns begin
   A<JointColumn> joint_columns;          // by control, then by group
-  // The same columns by group, then by control, for frames in which most of them are active. A
-  // weight is a control.
+  // The same columns by group, then by control, for frames in which most of them are active. The
+  // weight of a column is its control.
   A<simd::Column> group_columns;
-  // [LODs, controls + 1]: of each control, and last of all. Empty where a coefficient is not
-  // finite: then a column at rest must not be read.
+  // [LODs, controls + 1]: one entry for each control; the last entry is for all. Empty if a
+  // coefficient is not finite, because a column at rest must not be read then.
   A<ControlReads> control_reads;
   A<std::uint16_t> joints_written;  // joints that any group moves at any LOD, ascending
 
-  // Joints that are turned by quaternions.
+  // Joints that quaternions turn.
   A<QuaternionJoint> quaternion_joints;
   A<QuaternionColumn> quaternion_columns;
   A<QuaternionTerm> quaternion_terms;
   A<std::uint32_t> quaternion_column_begins;  // [controls + 1], or empty without such joints
   A<std::uint32_t> quaternion_column_list;    // indices into quaternion_columns, by control
-  // Where poses hold quaternions: the joints that are turned by Euler angles and need converting.
-  // Those of coarse LODs come first; a LOD converts the first euler_joint_lods[lod].
+  // If poses hold quaternions: the joints whose Euler angles need converting. The joints of coarse
+  // LODs come first; a LOD converts the first euler_joint_lods[lod].
   A<std::uint16_t> euler_joints;
   A<std::uint32_t> euler_joint_lods;  // [LODs]
 
@@ -342,7 +346,7 @@ struct RigArrays {
   A<std::uint16_t> shape_inputs, shape_outputs;
   A<std::uint32_t> shape_lods;  // [LODs]
   // The channels of each control, as indices into shape_inputs, for frames in which most controls
-  // rest. Both are empty where two channels are one: there the last one counts, at rest too.
+  // rest. Both are empty if two entries write one channel: then the last one counts, even at rest.
   A<std::uint32_t> shape_begins;  // [controls + 1]
   A<std::uint16_t> shapes_of_controls;
   // The table from controls to animated maps. A LOD has the first map_lods[lod] rows.
@@ -378,7 +382,7 @@ using Owned = std::vector<T>;
 template <class T>
 using View = std::span<const T>;
 
-/// A face while it is compiled.
+/// The arrays of a face during compilation.
 struct RigData : RigHeader, RigArrays<Owned> {};
 
 }  // namespace risorius::rig

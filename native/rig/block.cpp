@@ -27,7 +27,7 @@ constexpr std::size_t kArrays = [] {
   for_each_array(all, [&](const auto&) { ++n; });
   return n;
 }();
-constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 7};  // the last one: the version
+constexpr char kMagic[8] = {'R', 'S', 'R', 'I', 'G', 0, 0, 7};  // the last byte is the version
 constexpr std::uint32_t kByteOrder = 0x01020304;
 
 struct Place {
@@ -37,7 +37,7 @@ struct Place {
 struct BlockHeader {
   char magic[8];
   std::uint32_t byte_order, header_size;
-  std::uint64_t size, hash;  // the hash of everything behind it
+  std::uint64_t size, hash;  // hash of everything behind it
   RigHeader rig;
   Place places[kArrays];
 };
@@ -80,8 +80,8 @@ Status check_header(std::span<const std::uint8_t> bytes, const BlockHeader& h) {
 
 }  // namespace
 
-// Of a block that was made here: its hash is a tenth of the time of making it, and who never keeps
-// the bytes need not wait for it.
+// Delays the hash of a block that was compiled here: it takes a tenth of the time of making the
+// block, and a caller that never stores the bytes does not need it.
 struct Rig::Seal {
   std::span<std::uint8_t> bytes;
   std::once_flag done;

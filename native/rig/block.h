@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Rig as one block of bytes: how it is made, opened and checked.
+// A Rig as one block of bytes: making, opening and checking it.
 #pragma once
 
 #include <cstddef>
@@ -14,35 +14,35 @@
 namespace risorius::rig {
 
 enum class BlockCheck {
-  kHeader,  // version, sizes and places of the arrays: for bytes that this process wrote
+  kHeader,  // version, sizes and offsets of the arrays: for bytes that this process wrote
   kHash,    // and the hash, which finds every changed bit: for bytes that this program once wrote
-  kFull,    // and every index against its space: for bytes from anywhere, forged ones as well
+  kFull,    // and every index against its limit: for bytes of unknown origin, even forged ones
 };
 
-/// The joint_values of a Rig where data has none: they are written straight into the block, for a
-/// copy of them would take longer than all the rest.
+/// The joint_values of a Rig whose data has none. They are written straight into the block, because
+/// copying them would take longer than everything else.
 struct LateValues {
   std::size_t count = 0;
   std::function<void(std::span<float>)> write;  // overwrites all of them
 };
 
 /// Copies the arrays into one block and opens it.
-/// In:    data     as compile() makes it: it is not checked
-///        kernels  that the rig is evaluated with; they must outlive it
-/// Fails: kLimitExceeded (an array of more elements than an index reaches)
+/// In:    data     the result of compile(); it is not checked
+///        kernels  used in every evaluation; they must outlive the rig
+/// Fails: kLimitExceeded (an array with more elements than an index can address)
 core::Result<Rig> make_rig(const RigData& data, const simd::Kernels& kernels,
                            const LateValues& late = {});
 
-/// A Rig from the bytes of Rig::block(). Copies nothing: they stay where owner keeps them.
+/// A Rig from the bytes of Rig::block(). Copies nothing: the bytes stay in the memory of `owner`.
 /// In:    bytes    aligned to 64
-///        check    how far the bytes are trusted
-///        kernels  as make_rig has them
+///        check    how much is checked
+///        kernels  as in make_rig
 /// Fails: kInvalidValue, kInvalidIndex (bytes that are no Rig of this version and machine),
 ///        kInvalidArgument (alignment)
 core::Result<Rig> open_rig(std::span<const std::uint8_t> bytes, std::shared_ptr<const void> owner,
                            BlockCheck check, const simd::Kernels& kernels);
 
-/// Blocks of other versions are refused.
+/// The version of a block; open_rig refuses other versions.
 std::uint32_t block_version();
 
 /// Puts the hash of a block's bytes into its header. In: at least a header's size.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every index of a block of bytes against what it counts in.
+// Checks every index of a block against the size of the array that it points into.
 #include "rig/check.h"
 
 #include <algorithm>
@@ -15,7 +15,7 @@ using core::ErrorCode;
 using core::fail;
 using core::Status;
 
-// Indices of one array against the size of another.
+// Checks the indices of one array against the size of another.
 class IndexCheck {
  public:
   template <class T, class Get>
@@ -27,7 +27,7 @@ class IndexCheck {
   void below(const char* where, View<std::uint16_t> values, std::uint64_t limit) {
     below(where, values, limit, [](std::uint16_t v) { return v; });
   }
-  /// begins[0] = 0, never falling, the last one is the size of what it begins in.
+  /// Demands begins[0] = 0, ascending values, and a last value equal to the size of the array.
   void begins(const char* where, View<std::uint32_t> values, std::size_t size) {
     demand(where, std::ranges::is_sorted(values) && (values.empty() || values.back() == size));
   }
@@ -37,7 +37,7 @@ class IndexCheck {
   Status status() const {
     if (where_ == nullptr) return core::ok();
     return fail(ErrorCode::kInvalidIndex, std::string("rig.") + where_,
-                "a number in it points outside what it counts in");
+                "an index in it is out of range");
   }
 
  private:
@@ -86,7 +86,7 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   c.below("watched", r.watched, r.control_count, [](const Watch& w) { return w.other; });
   if (!c.status()) return;
   for (const Watch& w : r.watched) c.demand("watched", r.psds[w.psd].output >= r.raw_count);
-  // Each once at a LOD, so that no more are candidates than there are.
+  // A corrective is listed at most once per LOD, so that the list of candidates cannot overflow.
   std::vector<std::uint32_t> seen(r.psds.size(), kNone);
   for (std::uint32_t l = 0; l < r.lod_count; ++l) {
     const std::uint32_t* begins = r.watch_begins.data() + std::size_t{l} * (r.control_count + 1);
@@ -100,7 +100,7 @@ void check_correctives(const Rig& r, IndexCheck& c) {
   }
 }
 
-// Each is read as a column of its group.
+// Every entry is read as a column of its group.
 void check_group_columns(const Rig& r, std::uint64_t values, IndexCheck& c) {
   std::size_t i = 0;
   for (const JointGroup& g : r.joint_groups) {
@@ -123,15 +123,15 @@ void check_groups(const Rig& r, IndexCheck& c) {
     ++columns[column.group];
     const std::uint64_t end =
         column.offset + simd::rounded_up(r.joint_groups[column.group].row_count);
-    // A first value is read even of a column without rows.
+    // The first value is read even if the column has no rows.
     c.demand("joint_columns", end <= values && column.offset < values);
   }
   check_group_columns(r, values, c);
   std::uint64_t rows = 0, begin = 0;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const JointGroup& g = r.joint_groups[i];
-    // One after the other: a kernel writes whole registers, into the rows of the group that
-    // follows, but of long groups, which share no vector.
+    // Rows of groups follow each other without gaps: a kernel writes whole registers, so that it
+    // also overwrites rows of the next group. Only wide groups begin on a vector of their own.
     const bool wide = g.row_count >= simd::kWidest;
     if (wide) rows = simd::rounded_up(rows);
     c.demand("joint_groups",
@@ -147,7 +147,7 @@ void check_groups(const Rig& r, IndexCheck& c) {
   c.below("live_groups", r.live_groups, r.joint_groups.size() + 1, most);
 }
 
-// What a LOD places must be what it computes: other rows are what an earlier frame left.
+// A LOD may place only rows that it computes: other rows hold values of earlier frames.
 void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
   std::vector<std::uint32_t> live_before(r.joint_outputs.size() + 1);  // as a running count
   for (std::uint32_t i = 0; i < r.live_groups[lod]; ++i) {
@@ -169,7 +169,7 @@ void check_live_pieces(const Rig& r, std::uint32_t lod, IndexCheck& c) {
   demand("extra_pieces", r.extra_pieces.subspan(extra[0], extra[1] - extra[0]));
 }
 
-// The extra pieces of a LOD are looked up by their blocks.
+// The extra pieces of a LOD are looked up by block, so they must be sorted.
 bool in_order(const Rig& r) {
   for (std::size_t l = 0; l + 1 < r.extra_begins.size(); ++l) {
     const std::uint32_t* begin = r.extra_begins.data() + l;
@@ -199,7 +199,7 @@ void check_pieces(const Rig& r, IndexCheck& c) {
   for (const simd::Piece& p : r.extra_pieces) {
     c.demand("extra_pieces", p.block < blocks && (p.block + 1u < blocks || (p.mask & ~last) == 0));
   }
-  // A block outside of what its groups say would be left out while they move.
+  // A block outside of the group's range would be left out while the group moves it.
   for (const JointGroup& g : r.joint_groups) {
     c.demand("joint_groups", g.blocks_begin <= g.blocks_end && g.blocks_end <= blocks);
     for (std::uint32_t row = 0; row < g.row_count && c.status(); ++row) {
@@ -350,7 +350,7 @@ void check_gui_ranges(const Rig& r, IndexCheck& c) {
   c.below("gui_range_rows", r.gui_range_rows, r.gui_rows.size(), [](std::uint32_t v) { return v; });
 }
 
-// Whether the first of them follow each other.
+// Whether the first `count` values are consecutive.
 bool is_run(View<std::uint16_t> list, std::size_t count) {
   if (count > list.size()) return false;
   for (std::size_t i = 1; i < count; ++i) {

@@ -7,11 +7,11 @@
 
 namespace risorius::rig::detail {
 
-/// Scratch memory is at most 1 MiB and 64 times the block: counts of values and regions are numbers
-/// that no array backs.
+/// Whether scratch memory is at most 1 MiB plus 64 times the block. The counts of values and
+/// regions need this check because no array backs them.
 bool scratch_fits(const Rig& r);
 
-/// Fails: kInvalidIndex (an index or a size in a block that evaluation cannot take).
+/// Fails: kInvalidIndex (an index or size in the block that evaluation must not follow).
 core::Status check_everything(const Rig& rig);
 
 }  // namespace risorius::rig::detail

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What evaluate() does not look at: raw controls that are no numbers.
+// Finds raw controls that are NaN or infinite, which evaluate() does not check.
 #pragma once
 
 #include <cstddef>
@@ -18,16 +18,16 @@ struct NonFinite {
   float value = 0;
 };
 
-/// The raw controls that are NaN or infinite, frame after frame. evaluate() does not look: see
-/// there for what such a control spoils.
+/// The raw controls that are NaN or infinite, frame by frame. evaluate() tells which outputs such a
+/// control spoils.
 /// In:   raw   float32[count, R]
-///       most  of them that are returned
-/// Cost: one pass over raw; allocates only where something is found.
+///       most  the largest number of results
+/// Cost: one pass over raw; allocates only if something is found.
 std::vector<NonFinite> find_non_finite(const Rig& rig, const float* raw, std::size_t count,
                                        std::size_t most = SIZE_MAX);
 
-/// Fails: kInvalidValue, naming the first control that is not finite, its frame and its value, and
-/// how many there are.
+/// Fails: kInvalidValue; the error names the first control that is not finite, its frame, its
+///        value, and the number of such values.
 core::Status check_finite(const Rig& rig, const float* raw, std::size_t count);
 
 }  // namespace risorius::rig

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Pose: what an evaluation gives. Workspace: the memory that it needs.
+// Pose: the result of an evaluation. Workspace: its scratch memory.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,9 @@
 
 namespace risorius::rig {
 
-/// The output of one evaluation. Joint values are deltas from neutral in the file's units and axes:
-/// tx ty tz rx ry rz sx sy sz, or tx ty tz qx qy qz qw sx sy sz; a scale of 0 is no scale.
+/// The output of one evaluation. Joint values are deltas from the neutral pose in the file's units
+/// and axes: tx ty tz rx ry rz sx sy sz, or tx ty tz qx qy qz qw sx sy sz. A scale delta of 0 keeps
+/// the size.
 struct Pose {
   std::vector<float> joints;         // [joints, stride]
   std::vector<float> blend_shapes;   // [channels]
@@ -22,7 +23,7 @@ struct Pose {
   std::vector<float> controls;       // [controls]
 };
 
-/// Where a pose is written: the caller's memory, with the lengths of Pose.
+/// The caller's memory to which a pose is written, with the lengths of Pose.
 struct PoseView {
   float* joints = nullptr;
   float* blend_shapes = nullptr;
@@ -34,16 +35,17 @@ inline PoseView view(Pose& pose) {
           pose.controls.data()};
 }
 
-/// How the columns of the joint groups are gone through.
+/// The order in which an evaluation visits the columns of the joint groups.
 enum class Traversal : std::uint8_t {
-  kCounted,  // by whichever costs least in the frame
-  kListed,   // those of active controls, which are listed by group first
-  kAdded,    // those of active controls, in the order of memory; frames in a batch are listed
-  kWhole     // all of them, in the order of group_columns, where no coefficient forbids it
+  kCounted,  // the order that costs least in the frame, by counted bytes
+  kListed,   // only active controls, whose columns are first listed by group
+  kAdded,    // only active controls, in the order of memory; a batch of frames lists them instead
+  kWhole     // all columns, in the order of group_columns, if all coefficients are finite
 };
 
-/// The controls that something in a workspace was found for: while the same ones are not 0 it
-/// holds. In a film of 60 frames a second five of six have those of the frame before.
+/// The active controls for which something in a workspace was computed: it stays valid while the
+/// same controls are not 0. In a film of 60 frames per second, five frames of six have the active
+/// controls of the frame before.
 struct KeptControls {
   std::vector<std::uint16_t> controls;  // [controls]: the first count count
   std::size_t count = 0;
@@ -60,21 +62,22 @@ struct KeptControls {
   }
 };
 
-/// The scratch memory of an evaluation. Threads that evaluate at the same time need one each; its
+/// The scratch memory of an evaluation. Threads that evaluate at the same time need one each. The
 /// alignment keeps two of them out of one cache line, where they would slow each other down. Only
-/// masks, traversal, whole_frames and added_frames mean something to a caller.
+/// masks, traversal, whole_frames and added_frames concern a caller.
 struct alignas(128) Workspace {
   // Which controls are not 0.
-  std::vector<std::uint16_t> active;  // these controls, ascending; the first active_count count
+  // The active controls, ascending; the first active_count are valid.
+  std::vector<std::uint16_t> active;
   std::size_t active_count = 0;
-  std::size_t raw_active = 0;  // how many of them are raw controls
-  // Nobody reads this. A sum of values is stored here so that the compiler keeps the reads, which
+  std::size_t raw_active = 0;  // number of raw controls among them
+  // A sum of touched values. Nothing reads it; it keeps the compiler from dropping the reads, which
   // bring memory into the cache.
   std::uint32_t touched = 0;
-  // In evaluate_frames: the frames before have read what most of this one needs.
+  // In evaluate_frames: earlier frames have read most of the memory that this one needs.
   bool warm = false;
   // Correctives.
-  KeptControls firing_for;              // of what is listed in firing
+  KeptControls firing_for;              // the active controls for which firing holds
   std::vector<std::uint16_t> firing;    // watched correctives that may not be 0; the first
   std::size_t firing_count = 0;         // firing_count count
   bool fires_all = false;               // none of their factors is 0
@@ -82,31 +85,32 @@ struct alignas(128) Workspace {
   std::vector<float> last_controls;     // [controls]: the controls before the correctives ran
   // Joint groups.
   Traversal traversal = Traversal::kCounted;
-  KeptControls listed_for;                 // of the moves and blocks below
-  Traversal listed = Traversal::kListed;   // and of columns and ends, but for kAdded
+  KeptControls listed_for;  // the active controls for which moves and blocks hold
+  // The order for which they hold; for kAdded columns and ends do not.
+  Traversal listed = Traversal::kListed;
   std::size_t whole_frames = 0;            // evaluations that read all columns
   std::size_t added_frames = 0;            // evaluations that added columns in the order of memory
   std::vector<std::uint32_t> column_ends;  // [groups]: where a group's active columns end below
-  std::vector<std::uint8_t> moves;         // [groups]: 1 where a group has active columns
+  std::vector<std::uint8_t> moves;         // [groups]: 1 if a group has active columns
   std::vector<simd::Column> columns;       // the columns of active controls, as in group_columns
   core::AlignedVector<float> rows;         // the rows of all groups
-  core::AlignedVector<float> sums;         // the same, added up column by column; 0 between calls
-  std::vector<simd::Rows> group_rows;      // [LODs, groups]: where columns are added
-  std::vector<std::uint64_t> live_blocks;  // a bit for each block that a group which moves writes
+  core::AlignedVector<float> sums;         // the same, added column by column; 0 between calls
+  std::vector<simd::Rows> group_rows;      // [LODs, groups]: the sums of each group
+  std::vector<std::uint64_t> live_blocks;  // a bit for each block that an active group writes
   std::vector<std::uint32_t> live;         // the groups that write these blocks, ascending; the
   std::size_t live_count = 0;              // first live_count count
-  // As live_blocks was in the frame before, where the pose is an Instance's, which nobody else
-  // writes: other blocks are 0 already. Empty: nothing is known of the pose.
+  // The live_blocks of the frame before, if the pose belongs to an Instance: nothing else writes
+  // it, so all other blocks are 0 already. Empty: the content of the pose is unknown.
   std::vector<std::uint64_t> shown_blocks;
   // Rotations by quaternions.
-  std::vector<std::uint16_t> straight_joints;  // those that no Euler angles turn at any LOD
+  std::vector<std::uint16_t> straight_joints;  // joints that no Euler angles turn at any LOD
   std::vector<Quaternion> products;            // [quaternion joints]
   std::vector<std::uint64_t> quaternion_bits;  // a bit for each active column; 0 between calls
   // Solvers and networks.
   std::vector<double> solver;  // the inputs of a solver, then two values for each of its poses
   std::vector<float> masks;    // [regions]: at 0 the networks of the region rest
-  core::AlignedVector<float> operation_values;  // what operations computed
-  core::AlignedVector<float> layers[2];         // what a layer of a network reads and writes
+  core::AlignedVector<float> operation_values;  // results of operations
+  core::AlignedVector<float> layers[2];         // input and output of a network layer
   std::vector<simd::Column> layer_columns;      // the columns of a layer whose inputs are not 0
   // For evaluate_frames, which evaluates kFrames frames together.
   std::vector<std::uint64_t> union_bits;     // a bit for each control that is not 0 in any frame
@@ -122,8 +126,8 @@ Workspace make_batch_workspace(const Rig& rig);
 
 namespace detail {
 
-/// How many floats the rows of all groups take in a workspace. Kernels write whole vectors and read
-/// up to one vector too far, so there is room behind the last row.
+/// The number of floats that the rows of all groups take in a workspace. Kernels write whole
+/// vectors and read up to one vector too far, so there is room behind the last row.
 inline std::size_t rows_size(const Rig& rig) {
   return simd::rounded_up(rig.joint_outputs.size()) + simd::kWidest;
 }

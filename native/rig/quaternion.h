@@ -20,21 +20,22 @@ inline Quaternion multiply(const Quaternion& a, const Quaternion& b) {
       a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
 
-/// Of a 3x3 matrix, row after row. Negative where the matrix mirrors.
+/// Of a 3x3 matrix in row order. Negative if the matrix mirrors.
 inline float determinant(std::span<const float, 9> m) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
          m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
-/// How a file spells Euler angles: axes in the order of rotation, sign per axis, radians per unit.
+/// A file's convention of Euler angles: axes in the order of rotation, sign of each axis, radians
+/// per unit.
 struct EulerConvention {
   std::array<std::uint8_t, 3> order{0, 1, 2};
-  std::uint8_t zero = 0;  // in a block every byte is said, so that equal faces are equal bytes
+  std::uint8_t zero = 0;  // an explicit padding byte, so that equal faces give equal bytes
   std::array<float, 3> signs{1, 1, 1};
   float radians_per_unit = 1;
 };
 
-/// The rotation of Euler angles. In: angles about x y z, in the unit of the convention.
+/// The rotation of Euler angles. In: angles about x y z, in the unit of the convention
 inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3>& angles) {
   Quaternion q;
   for (const std::uint8_t axis : c.order) {
@@ -47,8 +48,8 @@ inline Quaternion from_euler(const EulerConvention& c, const std::array<float, 3
   return q;
 }
 
-/// The inverse of from_euler. In: q of length 1. Out: angles about x y z. At the pole the last
-/// angle of the order is 0.
+/// The inverse of from_euler. In: q of length 1. Out: angles about x y z; in gimbal lock the last
+/// angle of the order is 0
 inline std::array<float, 3> to_euler(const EulerConvention& c, const Quaternion& q) {
   const float m[3][3] = {
       // rows are the images of the axes (row vectors)

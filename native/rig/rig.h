@@ -19,13 +19,13 @@ namespace risorius::rig {
 class Rig : public RigHeader, public RigArrays<View> {
  public:
   const simd::Kernels* kernels = nullptr;
-  /// Another one for each Rig that this process opens, copies apart; never 0 for one that was
-  /// opened. What a workspace keeps from one frame to the next is kept for this number.
+  /// A number that is unique among the Rigs that this process opens (copies share it); never 0 for
+  /// an opened Rig. A workspace keeps results of earlier frames under this number.
   std::uint64_t number = 0;
 
   std::vector<std::string> raw_control_names() const { return texts(0, raw_count); }
   std::vector<std::string> gui_control_names() const { return texts(raw_count, gui_count); }
-  /// Behavior in the file that is not evaluated.
+  /// Layers of the file's behavior that are not evaluated.
   std::vector<std::string> ignored_layers() const {
     return texts(raw_count + gui_count, text_ends.size() - raw_count - gui_count);
   }
@@ -35,9 +35,9 @@ class Rig : public RigHeader, public RigArrays<View> {
     return steps.subspan(begin[0], begin[1] - begin[0]);
   }
   bool is_half() const { return !joint_halves.empty(); }
-  /// The whole Rig as bytes: a header with version and hash, then the arrays. Written to a file it
-  /// is a cache, for machines of the same byte order. The first call for a Rig that was compiled
-  /// here works out the hash; any number of threads may call.
+  /// The whole Rig as bytes: a header with version and hash, then the arrays. Such bytes can be
+  /// kept in a file as a cache for machines of the same byte order. The first call for a compiled
+  /// Rig computes the hash; calls are thread-safe.
   std::span<const std::uint8_t> block() const;
   std::size_t memory_bytes() const { return sizeof(Rig) + block_.size(); }
 
@@ -47,7 +47,7 @@ class Rig : public RigHeader, public RigArrays<View> {
   std::vector<std::string> texts(std::size_t first, std::size_t count) const;
   std::span<const std::uint8_t> block_;
   std::shared_ptr<const void> owner_;
-  std::shared_ptr<Seal> seal_;  // null where the bytes had their hash from the beginning
+  std::shared_ptr<Seal> seal_;  // null if the bytes had their hash when they were opened
 };
 
 }  // namespace risorius::rig

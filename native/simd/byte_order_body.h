@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Big-endian numbers of a file to the machine's byte order, for the file of each instruction set:
-// plain loops, of which the compiler makes vectors under RISORIUS_TARGET.
+// Converts big-endian numbers of a file to the machine's byte order, once for each instruction set.
+// Plain loops, which the compiler vectorises under RISORIUS_TARGET.
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -22,7 +22,7 @@ RISORIUS_INLINE std::uint32_t from_big_endian(std::uint32_t v) {
   return (v >> 24) | ((v >> 8) & 0xFF00u) | ((v << 8) & 0xFF0000u) | (v << 24);
 }
 
-// The number at `from`, which is also copied to `to`.
+// Reads the number at `from` and copies it to `to`.
 template <class Word>
 RISORIUS_INLINE Word copy_number(const std::uint8_t* from, void* to) {
   Word v;

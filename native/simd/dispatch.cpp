@@ -10,7 +10,7 @@ namespace risorius::simd {
 
 namespace {
 
-// The best last.
+// In ascending order of preference.
 std::array<const Kernels*, 5> tables() {
   return {&scalar_kernels(), sse4_kernels(), neon_kernels(), avx2_kernels(), avx512_kernels()};
 }

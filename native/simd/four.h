@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Four floats at a time, by what every CPU of the platform has.
+// Four floats at a time, with instructions that every CPU of the platform has.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@
 
 namespace risorius::simd {
 
-/// Four numbers. What is NaN stays NaN.
+/// Four numbers. NaN stays NaN.
 #if defined(__x86_64__) || defined(_M_X64)
 struct Four {
   __m128 v;
@@ -21,7 +21,7 @@ struct Four {
   void store(float* p) const { _mm_storeu_ps(p, v); }
   Four operator*(Four o) const { return {_mm_mul_ps(v, o.v)}; }
   Four operator+(Four o) const { return {_mm_add_ps(v, o.v)}; }
-  // Of NaN and a number these instructions take the second.
+  // If the first operand is NaN, these instructions return the second.
   Four at_least(float x) const { return {_mm_max_ps(_mm_set1_ps(x), v)}; }
   Four at_most(float x) const { return {_mm_min_ps(_mm_set1_ps(x), v)}; }
   bool any_but_0() const { return _mm_movemask_ps(_mm_cmpneq_ps(v, _mm_setzero_ps())) != 0; }
@@ -69,9 +69,9 @@ struct Four {
 };
 #endif
 
-/// Four rows of four as four columns.
+/// Transposes four rows of four numbers.
 /// In:  from  4 numbers at each of from, from + stride, from + 2 stride and from + 3 stride
-/// Out: a, b, c, d  4 numbers each: the first, second, third and fourth of these
+/// Out: a, b, c, d  4 numbers each: the first, second, third and fourth of each row
 inline void turn_four(const float* from, std::size_t stride, float* a, float* b, float* c,
                       float* d) {
 #if defined(__x86_64__) || defined(_M_X64)

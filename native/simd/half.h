@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// IEEE 754 half floats, without the CPU's help.
+// IEEE 754 half floats in plain code.
 #pragma once
 
 #include <bit>
@@ -10,9 +10,9 @@ namespace risorius::simd {
 
 inline constexpr float kLargestHalf = 65504.0f;
 
-/// In: a half that is finite. Exact.
+/// In: a finite half. Exact.
 inline float from_half(std::uint16_t half) {
-  // The exponent's bias differs by 112: multiplying by 2^112 puts it right, for denormals too.
+  // The exponent biases differ by 112: multiplying by 2^112 corrects that, for denormals too.
   const float magnitude = std::bit_cast<float>((half & 0x7FFFu) << 13) * 0x1p112f;
   const std::uint32_t sign = (half & 0x8000u) << 16;
   return std::bit_cast<float>(std::bit_cast<std::uint32_t>(magnitude) | sign);
@@ -23,7 +23,7 @@ inline std::uint16_t to_half(float value) {
   const std::uint32_t sign = (std::bit_cast<std::uint32_t>(value) >> 16) & 0x8000u;
   const float magnitude = std::fabs(value);
   std::uint32_t bits;
-  if (magnitude < 0x1p-14f) {  // a denormal half: count its steps
+  if (magnitude < 0x1p-14f) {  // a denormal half counts steps of 2^-24
     bits = static_cast<std::uint32_t>(std::nearbyint(magnitude * 0x1p24f));
   } else {
     const std::uint32_t wide = std::bit_cast<std::uint32_t>(magnitude) - (112u << 23);

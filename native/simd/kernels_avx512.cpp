@@ -17,15 +17,15 @@ namespace risorius::simd {
 
 namespace {
 
-// Sixteen rotations at a time, four to a register: what is stored here is what the sines load,
-// which would have to wait for two stores of half a register. The fourth number of each rotation is
-// read, and written, with the others.
+// Sixteen rotations at a time, four in a register. The sines load exactly these registers; loads
+// across two half stores would wait for both. The fourth number of each rotation is read and
+// written with the others.
 struct SixteenByFour {
   static_assert(kTurns == 16);
-  // With masks: gcc 12 takes the plain ones for reads of something unset.
+  // With masks, because gcc 12 warns about reads of unset values in the plain intrinsics.
   static constexpr __mmask16 kAll = 0xFFFF;
   static constexpr __mmask8 kFour = 0xF;
-  // Of each quarter: r[k] lane i becomes r[i] lane k.
+  // In each quarter: r[k] lane i becomes r[i] lane k.
   RISORIUS_INLINE static void transpose(__m512 (&r)[4]) {
     const __m512 a = _mm512_maskz_unpacklo_ps(kAll, r[0], r[1]),
                  b = _mm512_maskz_unpackhi_ps(kAll, r[0], r[1]),
@@ -61,7 +61,7 @@ struct SixteenByFour {
       _mm_storeu_ps(rotations + at[i + 12], _mm512_maskz_extractf32x4_ps(kFour, r[i], 3));
     }
   }
-  // As OneByOne: one instruction gathers the signs.
+  // Like OneByOne, but one instruction gathers the signs.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m512i most = _mm512_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm512_set1_epi32(0x7FFFFFFF);
@@ -75,9 +75,9 @@ struct SixteenByFour {
   }
 };
 
-// All columns of the matrix in one register. Two sums of each vertex: an addition takes four
-// cycles, and one in a cycle would be all that four sums allow. With masks: gcc 12 takes the plain
-// instructions for reads of something unset.
+// Blends all columns of the matrix in one register. Each vertex has two sums, because an addition
+// takes four cycles and four sums would allow only one addition per cycle. With masks, because gcc
+// 12 warns about reads of unset values in the plain intrinsics.
 struct AllColumns {
   static constexpr __mmask16 kAll = 0xFFFF;
   static constexpr __mmask8 kThree = 7, kFour = 0xF, kEight = 0xFF;
@@ -110,19 +110,20 @@ struct AllColumns {
         _mm_add_ps(_mm256_castps256_ps128(two), _mm256_maskz_extractf32x4_ps(kFour, two, 1));
     _mm_mask_storeu_ps(out, kThree, _mm_add_ps(p, one));
   }
-  // Columns times the numbers of a point. In: four  twelve numbers of four points, then 1
+  // Products of the columns with the coordinates of a point. In: four  twelve coordinates of four
+  // points, then 1
   template <int kVertex>
   RISORIUS_INLINE static __m512 products(const Sum& sum, __m512 four) {
     constexpr int x = 3 * kVertex, y = x + 1, z = x + 2, w = 12;
     const __m512i column = _mm512_setr_epi32(x, x, x, x, y, y, y, y, z, z, z, z, w, w, w, w);
     return _mm512_mul_ps(sum.whole(), _mm512_maskz_permutexvar_ps(kAll, column, four));
   }
-  // The sums of the first and the third, the second and the fourth quarter, of two vertices.
+  // Adds the first and third, and the second and fourth quarter, of two vertices.
   RISORIUS_INLINE static __m512 halves(__m512 a, __m512 b) {
     return _mm512_add_ps(_mm512_maskz_shuffle_f32x4(kAll, a, b, 0x44),
                          _mm512_maskz_shuffle_f32x4(kAll, a, b, 0xEE));
   }
-  // Neighbours. To read by a mask takes longer than to read two parts, to write does not.
+  // For four consecutive vertices. A masked read is slower than two reads; a masked write is not.
   RISORIUS_INLINE static void finish_four(const Sum* sums, const float* points, float* out) {
     const __m256 last = _mm256_insertf128_ps(_mm256_set1_ps(1.0f), _mm_loadu_ps(points + 8), 0);
     const __m512 first = _mm512_maskz_broadcast_f32x8(kAll, _mm256_loadu_ps(points));
@@ -148,7 +149,7 @@ struct V {
   RISORIUS_INLINE static Reg set(float v) { return _mm512_set1_ps(v); }
   RISORIUS_INLINE static Reg load(const float* p) { return _mm512_loadu_ps(p); }
   RISORIUS_INLINE static Reg load(const std::uint16_t* p) {
-    // With a mask: gcc 12 takes the plain one for a read of something unset.
+    // With a mask, because gcc 12 warns about a read of unset values.
     return _mm512_maskz_cvtph_ps(0xFFFF, _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)));
   }
   RISORIUS_INLINE static void store(float* p, Reg v) { _mm512_storeu_ps(p, v); }
@@ -162,8 +163,8 @@ struct V {
     const auto places = static_cast<__mmask16>(mask);
     _mm512_mask_storeu_ps(to, places, _mm512_maskz_expand_ps(places, load(from)));
   }
-  // Where many frames have the same order: which value each place takes is found once, and to
-  // permute takes half as long as to expand.
+  // Used if many frames have the same order: the value of each place is found once, and a
+  // permutation takes half the time of an expansion.
   struct Orders {
     __mmask16 places;
     __m512i values;

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The kernels over a vector type V, for the file of each instruction set. The file defines
-// RISORIUS_TARGET (the functions' target attribute: a file compiled with -mavx2 could give the
-// linker an inline standard function that older CPUs cannot run) and V with
+// The kernels over a vector type V, compiled once for each instruction set. The including file
+// defines RISORIUS_TARGET (the functions' target attribute: in a file compiled with -mavx2 the
+// linker could pick an inline standard function that older CPUs cannot run) and V with
 //   Reg, kLanes, zero(), set(float), load(const float*), load(const uint16_t*), store(float*, Reg),
-//   madd(a, b, sum), order(mask), expand(from, order, to) and expand_more (kernels.h, place), where
-//   it has one for many frames orders(mask), and kBlocks, kBatchBlocks: registers of rows at once;
-//   kBatchFrames; Parts: as OneByOne of rotations_body.h; Skin: as S of skin_body.h.
+//   madd(a, b, sum), order(mask), expand(from, order, to) and expand_more (kernels.h, place),
+//   optionally orders(mask) for many frames; kBlocks and kBatchBlocks: registers of rows at once;
+//   kBatchFrames; Parts: like OneByOne of rotations_body.h; Skin: like S of skin_body.h.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,8 +20,8 @@ namespace risorius::simd {
 
 namespace {
 
-// kCount registers of rows of some frames. Without loops: of these gcc 12 keeps the sums in memory
-// before and after the loop over columns.
+// kCount registers of rows of some frames. Unrolled by templates, because gcc 12 keeps sums of a
+// loop in memory.
 template <class Frames, class Rows>
 struct BlockSums;
 template <std::size_t... kFrame, std::size_t... kRow>
@@ -33,7 +33,7 @@ struct BlockSums<std::index_sequence<kFrame...>, std::index_sequence<kRow...>> {
   RISORIUS_INLINE void add(std::size_t f, V::Reg weight, const V::Reg* rows) {
     ((sums[f][kRow] = V::madd(weight, rows[kRow], sums[f][kRow])), ...);
   }
-  // In: weights  one of each frame
+  // In: weights  one for each frame
   template <class T>
   RISORIUS_INLINE void add(const T* column, const float* weights) {
     const V::Reg rows[] = {V::load(column + kRow * V::kLanes)...};
@@ -60,7 +60,7 @@ RISORIUS_TARGET void block(const T* values, const Column* columns, std::size_t n
   sums.store(out, 0);
 }
 
-// Of V::kBatchFrames frames: each value read serves them all.
+// For V::kBatchFrames frames: each value is read once for all of them.
 template <int kCount, class T>
 RISORIUS_TARGET void batch_block(const T* values, const Column* columns, std::size_t n,
                                  const float* weights, float* out, std::size_t stride) {
@@ -81,7 +81,7 @@ constexpr auto batch_block_table(std::integer_sequence<int, kCounts...>) {
   return std::array{&batch_block<kCounts + 1, T>...};
 }
 
-// Calls f(first register, registers) for as few and as equal blocks as there must be.
+// Calls f(first register, registers) for the smallest number of blocks, of about equal size.
 template <class F>
 void for_blocks(std::size_t rows, std::size_t most, F f) {
   const std::size_t all = (rows + V::kLanes - 1) / V::kLanes, blocks = (all + most - 1) / most;
@@ -102,7 +102,7 @@ void columns(const T* values, const Column* list, std::size_t n, const float* we
   });
 }
 
-// kWidest sums.
+// Adds kWidest values.
 template <class T>
 RISORIUS_INLINE void add(V::Reg weight, const T* values, const float* sums, float* to) {
   for (std::size_t l = 0; l < kWidest; l += V::kLanes) {
@@ -151,7 +151,7 @@ RISORIUS_INLINE auto order_of(std::uint32_t mask) {
   }
 }
 
-// What a piece says is made out once for all frames.
+// Decodes each piece once for all frames.
 template <bool kMore, bool kMany>
 RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames frames) {
   for (std::size_t i = 0; i < n; ++i) {
@@ -166,7 +166,7 @@ RISORIUS_INLINE void place_in(const Piece* pieces, std::size_t n, PlacedFrames f
   }
 }
 
-// One frame without the loop over them.
+// One frame without the loop over frames.
 template <bool kMore>
 RISORIUS_TARGET void place(const Piece* pieces, std::size_t n, const PlacedFrames& frames) {
   if (frames.count == 1) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the kernels' files share. RISORIUS_INLINE: a function of the file's target, always inlined.
-// After RISORIUS_TARGET.
+// Definitions that the kernels' files share. RISORIUS_INLINE: a function of the file's target,
+// always inlined. Include it after RISORIUS_TARGET.
 #pragma once
 
 #include <array>
@@ -16,8 +16,8 @@
 
 namespace risorius::simd {
 
-/// For each mask of four places the bytes that each takes; of none, 0. For vectors whose bytes a
-/// table orders.
+/// For each mask of four places the bytes that each place takes; 0 for a place without a value. For
+/// instruction sets that shuffle bytes by a table.
 inline constexpr auto kExpandBytes = [] {
   std::array<std::array<std::uint8_t, 16>, 16> orders{};
   for (std::size_t mask = 0; mask < 16; ++mask) {

@@ -19,7 +19,7 @@ namespace risorius::simd {
 
 namespace {
 
-// Four rotations at a time: the fourth number of each is read, and written, with the others.
+// Four rotations at a time; the fourth number of each is read and written with the others.
 struct FourByFour {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {
@@ -39,7 +39,7 @@ struct FourByFour {
       for (std::size_t i = 0; i < 4; ++i) _mm_storeu_ps(rotations + at[l + i], r[i]);
     }
   }
-  // As OneByOne: one instruction gathers the signs.
+  // Like OneByOne, but one instruction gathers the signs.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m128i most = _mm_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm_set1_epi32(0x7FFFFFFF);
@@ -52,7 +52,7 @@ struct FourByFour {
   }
 };
 
-// A row of the matrix in each register.
+// Blends a row of the matrix in each register.
 struct RowsOfFour {
   struct Sum {
     __m128 r[3];
@@ -81,7 +81,7 @@ struct RowsOfFour {
   RISORIUS_INLINE static void pack(const float* matrix, float* row) { pack_rows(matrix, row); }
 };
 
-// Products and sums are rounded one by one, as in the scalar path.
+// Products and sums are rounded separately, as in the scalar path.
 struct V {
   using Parts = FourByFour;
   using Skin = RowsOfFour;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rotations into arrays of their parts and back by AVX2, for the kernels that have it. After
+// Splits rotations into arrays of their parts and joins them again, with AVX2. Include it after
 // RISORIUS_TARGET.
 #pragma once
 
@@ -15,11 +15,11 @@ namespace risorius::simd {
 
 namespace {
 
-// Eight rotations at a time, the fifth to eighth in the upper halves: what is stored here is what
-// the sines load, which would have to wait for two stores of half a register. The fourth number of
-// each rotation is read, and written, with the others.
+// Eight rotations at a time, the fifth to eighth in the upper halves. The sines load exactly these
+// registers; loads across two half stores would wait for both. The fourth number of each rotation
+// is read and written with the others.
 struct EightByFour {
-  // Of each half: r[k] lane i becomes r[i] lane k.
+  // In each half: r[k] lane i becomes r[i] lane k.
   RISORIUS_INLINE static void transpose(__m256 (&r)[4]) {
     const __m256 a = _mm256_unpacklo_ps(r[0], r[1]), b = _mm256_unpackhi_ps(r[0], r[1]),
                  c = _mm256_unpacklo_ps(r[2], r[3]), d = _mm256_unpackhi_ps(r[2], r[3]);
@@ -53,7 +53,7 @@ struct EightByFour {
       }
     }
   }
-  // As OneByOne: one instruction gathers the signs.
+  // Like OneByOne, but one instruction gathers the signs.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     const __m256i most = _mm256_set1_epi32(static_cast<int>(limit)),
                   all_but_sign = _mm256_set1_epi32(0x7FFFFFFF);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Euler angles to quaternions, for the file of each instruction set: loops of a constant count, of
-// which the compiler makes vectors under RISORIUS_TARGET. Their bits are the same on every CPU.
+// Converts Euler angles to quaternions, compiled once for each instruction set. Loops have constant
+// counts, so that the compiler vectorises them under RISORIUS_TARGET. The bits are the same on
+// every CPU.
 #pragma once
 
 #include <bit>
@@ -19,11 +20,11 @@ namespace {
 
 constexpr std::size_t kTurns = 16;
 using Turns = float[kTurns];
-// About all three axes: one loop over them keeps more sines under way than three loops do.
+// Angles about all three axes: one loop over them overlaps more sines than three loops.
 constexpr std::size_t kAngles = 3 * kTurns;
 using Angles = float[kAngles];
 
-// Sine and cosine of up to an eighth of a turn, by Cephes' polynomials.
+// Sine and cosine of angles up to an eighth of a turn, by Cephes' polynomials.
 RISORIUS_INLINE float near_sine(float r, float z) {
   return r + r * z * (-1.6666654611e-1f + z * (8.3321608736e-3f + z * -1.9515295891e-4f));
 }
@@ -32,9 +33,9 @@ RISORIUS_INLINE float near_cosine(float z) {
          z * z * (4.166664568298827e-2f + z * (-1.388731625493765e-3f + z * 2.443315711809948e-5f));
 }
 
-// The same after a reduction by quarter turns; error below 1e-7.
+// Sine and cosine of any angle, reduced by quarter turns; error below 1e-7.
 RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
-  constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: what is added to it ends as an integer
+  constexpr float kRound = 12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer
   for (std::size_t l = 0; l < kAngles; ++l) {
     const float shifted = x[l] * 0.636619772367581343f + kRound, quarters = shifted - kRound;
     const auto n = std::bit_cast<std::uint32_t>(shifted);
@@ -47,8 +48,8 @@ RISORIUS_INLINE void sine_and_cosine(const Angles& x, Angles& sines, Angles& cos
     cosines[l] = std::bit_cast<float>(((cb & ~swap) | (sb & swap)) ^ (((n + 1u) & 2u) << 30));
   }
 }
-// The bits of that where every angle is small enough for no quarter turn. Faces rarely turn a joint
-// by 90 degrees, and this takes half as long.
+// The same bits for angles that need no reduction. Faces rarely turn a joint by 90 degrees, and
+// this takes half the time.
 RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     const float z = x[l] * x[l];
@@ -57,8 +58,8 @@ RISORIUS_INLINE void near_sine_and_cosine(const Angles& x, Angles& sines, Angles
   }
 }
 
-constexpr float kNear = 0.785f;      // less than an eighth of a turn
-constexpr float kReduced = 8192.0f;  // what the reduction is good for
+constexpr float kNear = 0.785f;      // slightly less than an eighth of a turn
+constexpr float kReduced = 8192.0f;  // largest angle for which the reduction is exact enough
 void repair(const Angles& x, Angles& sines, Angles& cosines) {
   for (std::size_t l = 0; l < kAngles; ++l) {
     if (std::fabs(x[l]) <= kReduced) continue;
@@ -67,7 +68,7 @@ void repair(const Angles& x, Angles& sines, Angles& cosines) {
   }
 }
 
-// Half angles in the order of rotation to quaternions, w last.
+// Converts half angles in the order of rotation to quaternions with w last.
 template <class Parts>
 RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   alignas(64) Angles sines, cosines;
@@ -90,7 +91,7 @@ RISORIUS_INLINE void turn(float parity, const Angles& half, Turns (&q)[4]) {
   }
 }
 
-// Brings rotations that lie apart into arrays of their parts, and back. In: at  kTurns places
+// Copies scattered rotations into arrays of their parts, and back. In: at  kTurns offsets
 struct OneByOne {
   RISORIUS_INLINE static void split(const float* rotations, const std::uint32_t* at,
                                     Turns (&angles)[3]) {
@@ -104,9 +105,8 @@ struct OneByOne {
       for (std::size_t k = 0; k < 4; ++k) rotations[at[l] + k] = (*parts[k])[l];
     }
   }
-  // Whether an angle is larger than a positive limit, given by its bits, infinite or NaN: the sign
-  // of a difference says it, which the compiler makes a vector of where it takes a comparison
-  // apart.
+  // Whether an angle exceeds a positive limit (given by its bits), or is infinite or NaN. The sign
+  // of a difference tells it, because the compiler would not vectorise a comparison.
   RISORIUS_INLINE static bool any_beyond(const Angles& x, std::uint32_t limit) {
     std::uint32_t beyond = 0;
     for (std::size_t l = 0; l < kAngles; ++l) {
@@ -135,7 +135,7 @@ RISORIUS_TARGET void turn_together(const EulerTurns& e, const std::uint32_t* at,
 
 // Whether an angle is anything but +0.
 RISORIUS_INLINE bool turns(const float* angles) {
-  // Two numbers, no array: that would be stored and read again.
+  // Copied to two numbers, because an array would be stored and read again.
   std::uint64_t two = 0;
   std::uint32_t third = 0;
   std::memcpy(&two, angles, sizeof(two));
@@ -143,13 +143,14 @@ RISORIUS_INLINE bool turns(const float* angles) {
   return (two | third) != 0;
 }
 
-// Those that turn are gathered; the others are no rotation. Sixteen are turned when as many twice
-// have been gathered behind them: what was written just before would have to be waited for.
+// Gathers the rotations that turn and sets the others to no rotation. A batch of sixteen is
+// computed only when another sixteen have been gathered behind it, because it would otherwise wait
+// for the stores just before.
 template <class Parts>
 RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which, std::size_t n,
                                  float* rotations, std::size_t stride) {
   constexpr std::size_t kBehind = 3 * kTurns;
-  std::uint32_t turning[17 * kTurns];  // where they begin
+  std::uint32_t turning[17 * kTurns];  // offsets of the gathered rotations
   std::size_t count = 0, done = 0;
   float elsewhere = 0;
   for (std::size_t i = 0; i < n; i += kTurns) {
@@ -157,7 +158,8 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     for (std::size_t j = i; j < end; ++j) {
       const std::size_t at = which[j] * stride;
       const bool moves = turns(rotations + at);
-      float* w = moves ? &elsewhere : rotations + at + 3;  // the others' are written with them
+      // The w of gathered rotations is written later.
+      float* w = moves ? &elsewhere : rotations + at + 3;
       *w = 1.0f;
       turning[count] = static_cast<std::uint32_t>(at);
       count += moves ? 1 : 0;
@@ -175,7 +177,7 @@ RISORIUS_TARGET void quaternions(const EulerTurns& e, const std::uint16_t* which
     turn_together<Parts>(e, turning + done, rotations);
   }
   if (count == done) return;
-  // Arrays that are not full get the last one over and over: it is read before it is written.
+  // Fills incomplete arrays by repeating the last rotation: it is read before it is written.
   for (std::size_t l = count; l < done + kTurns; ++l) turning[l] = turning[count - 1];
   turn_together<Parts>(e, turning + done, rotations);
 }

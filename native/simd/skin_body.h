@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The skinning kernel over a type S, for the file of each instruction set. S has
-//   Sum: what the matrices of a vertex are blended in; zero(); kTogether: vertices at once, 1, 2 or
-//   4, so that none has to wait for its own sums; Weights, weights(const float*): four of them;
-//   add<i>(sum, weights, row): weight i times a row; finish(sum, point, out), and where it has a
-//   shorter way for neighbours finish_four(sums, points, out); pack(matrix, row): of skin_rows.
-// After RISORIUS_TARGET.
+// The skinning kernel over a type S, compiled once for each instruction set. S has
+//   Sum: the blended matrices of a vertex; zero(); kTogether: number of vertices at once, 1, 2 or
+//   4, so that no addition waits for the one before; Weights, weights(const float*): four of them;
+//   add<i>(sum, weights, row): adds weight i times a row; finish(sum, point, out), and optionally
+//   finish_four(sums, points, out) for consecutive vertices; pack(matrix, row): see skin_rows.
+// Include it after RISORIUS_TARGET.
 #pragma once
 
 #include <bit>
@@ -20,13 +20,13 @@ namespace risorius::simd {
 
 namespace {
 
-// Four influences of a vertex, one after the other.
+// Adds four influences of a vertex, one after the other.
 template <class S, std::size_t... kInfluence>
 RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std::uint16_t* bones,
                               const float* weights, std::index_sequence<kInfluence...>) {
   const typename S::Weights all = S::weights(weights);
   if constexpr (S::kTogether == kSkinGroup && std::endian::native == std::endian::little) {
-    // One read for four bones: reads are what most of the time goes into.
+    // One read for four bones, because reads take most of the time.
     std::uint64_t four;
     std::memcpy(&four, bones, sizeof four);
     (S::template add<kInfluence>(
@@ -38,7 +38,7 @@ RISORIUS_INLINE void add_four(typename S::Sum& sum, const float* rows, const std
   }
 }
 
-// Some vertices of a group.
+// Adds influences of some vertices of a group.
 template <class S, std::size_t... kVertex>
 RISORIUS_INLINE void add_all(typename S::Sum* sums, const float* rows, const std::uint16_t* bones,
                              const float* weights, std::size_t fours,
@@ -66,7 +66,7 @@ RISORIUS_INLINE void finish_group(const typename S::Sum* sums, const std::uint16
                                   const float* points, float* out,
                                   std::index_sequence<kVertex...>) {
   if constexpr (requires { S::finish_four(sums, points, out); }) {
-    if (vertices[3] - vertices[0] == 3) {  // they ascend, so these are neighbours
+    if (vertices[3] - vertices[0] == 3) {  // they ascend, so these four are consecutive
       const std::size_t at = std::size_t{vertices[0]} * 3;
       return S::finish_four(sums, points + at, out + at);
     }
@@ -123,13 +123,13 @@ RISORIUS_TARGET void skin_rows(const float* matrices, std::size_t n, float* rows
   }
 }
 
-// A matrix as it is, row after row: for vectors of four.
+// Stores a matrix by rows: for vectors of four.
 RISORIUS_INLINE void pack_rows(const float* matrix, float* row) {
   for (std::size_t i = 0; i < 12; ++i) row[i] = matrix[i];
   for (std::size_t i = 12; i < kSkinRow; ++i) row[i] = 0.0f;
 }
-// Column after column, each with a 0 behind it: for wider vectors, which multiply columns by the
-// numbers of a point and have few sums left then.
+// Stores a matrix by columns, each followed by a 0: for wider vectors, which multiply columns by
+// the coordinates of a point and then have few additions left.
 RISORIUS_INLINE void pack_columns(const float* matrix, float* row) {
   for (std::size_t c = 0; c < 4; ++c) {
     for (std::size_t r = 0; r < 3; ++r) row[4 * c + r] = matrix[4 * r + c];

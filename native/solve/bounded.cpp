@@ -8,8 +8,8 @@ namespace risorius::solve {
 
 namespace {
 
-/// Solves m x = b for a symmetric positive m [n, n], which is overwritten; a pivot that is not
-/// above 0 for rounding counts as no direction. In: x  is b. Out: x
+/// Solves m x = b for a symmetric positive definite m [n, n], which is overwritten. A direction
+/// whose pivot is 0 or negative by rounding is left out. In: x  holds b. Out: x
 void solve_symmetric(std::size_t n, double* m, double* x) {
   for (std::size_t j = 0; j < n; ++j) {
     double* row = m + j * n;
@@ -58,7 +58,7 @@ struct Dual {
       for (std::size_t c = 0; c < columns; ++c) slope[r] += a[r * columns + c] * x[c];
     }
   }
-  /// The value whose slope image() gives.
+  /// The dual function, whose gradient is the slope of image().
   double value(const std::vector<double>& y) const {
     double sum = 0.0;
     for (std::size_t r = 0; r < rows; ++r) sum += y[r] * (0.5 * y[r] - b[r]);
@@ -70,7 +70,7 @@ struct Dual {
     }
     return sum;
   }
-  /// The step of Newton's method from where image() gave x and slope.
+  /// A Newton step at the point where image() gave x and slope.
   std::vector<double> step(const double* x, const std::vector<double>& slope) const {
     std::vector<double> m(rows * rows), out(rows);
     for (std::size_t c = 0; c < columns; ++c) {
@@ -102,7 +102,7 @@ struct Descent {
     const double* row = q.h + i * q.count;
     for (std::size_t k = 0; k < q.count; ++k) slope[k] -= by * row[k];
   }
-  /// Each coordinate to its best value. Out: the largest change
+  /// Moves each coordinate to its minimum. Out: the largest change
   double sweep() {
     double largest = 0.0;
     for (std::size_t i = 0; i < q.count; ++i) {
@@ -122,8 +122,8 @@ struct Descent {
     }
     return largest;
   }
-  /// All coordinates between their bounds and on one side of rest at once, as far as all stay
-  /// there.
+  /// A Newton step in the free coordinates: those strictly between their bounds and not at rest.
+  /// The step is shortened so that no coordinate crosses a bound or its rest.
   void newton() {
     std::vector<std::size_t> loose;
     for (std::size_t i = 0; i < q.count; ++i) {
@@ -135,7 +135,7 @@ struct Descent {
     for (std::size_t r = 0; r < n; ++r) {
       const std::size_t i = loose[r];
       for (std::size_t s = 0; s <= r; ++s) m[r * n + s] = q.h[i * q.count + loose[s]];
-      // Without it two controls that do the same would have no best values.
+      // Without this ridge two controls with the same effect would have no unique minimum.
       m[r * n + r] *= 1.0 + 1e-9;
       step[r] = slope[i] - (x[i] > q.rest[i] ? q.sparse[i] : -q.sparse[i]);
     }
@@ -206,7 +206,7 @@ void normal_matrix(const Jacobian& jacobian, double* h) {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t r = 0; r < kRows; ++r) rows[r * n + i] = block.values[i * kRows + r];
     }
-    // Row by row, so that the inner loop adds numbers that lie side by side.
+    // Row by row, so that the inner loop adds adjacent numbers.
     for (std::size_t r = 0; r < kRows; ++r) {
       const float* row = rows.data() + r * n;
       for (std::size_t i = 0; i < n; ++i) {

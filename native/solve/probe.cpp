@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::uint32_t kUnused = 0xFFFFFFFFu;
 
-/// Lists of users: of each thing the points that use it, ascending.
-/// In:  begins, things  what each point uses
+/// Inverts lists: for each thing, the points that use it, ascending.
+/// In:  begins, things  the things that each point uses
 /// Out: user_begins     [count + 1] into users
 template <class T, class F>
 void invert(const std::vector<std::uint32_t>& begins, const std::vector<T>& things,
@@ -99,7 +99,7 @@ void Probe::list_users() {
   is_marked_.resize(points_.size());
 }
 
-// Makes a frame of the last evaluation the pose that others are compared with.
+// Makes a frame of the last evaluation the base pose for differences.
 void Probe::take(std::size_t frame) {
   const rig::Rig& rig = *surface_.rig;
   const float* joints = joint_values_.data() + frame * rig.joint_count * 9;
@@ -146,7 +146,8 @@ void Probe::mark(std::span<const std::uint32_t> users) {
   }
 }
 
-// Takes over what a frame has otherwise than the base, and marks the points that hang on it.
+// Takes the values in which a frame differs from the base pose, and marks the points that depend on
+// them.
 void Probe::changed(std::size_t frame) {
   const rig::Rig& rig = *surface_.rig;
   const float* joints = joint_values_.data() + frame * rig.joint_count * 9;
@@ -181,7 +182,7 @@ void Probe::positions(const float* raw, double* out) {
   for (const std::array<double, 3>& p : base_) out = std::copy(p.begin(), p.end(), out);
 }
 
-// A control's column from what changed() has marked; then all is as at the base again.
+// Makes a control's column from the points that changed() marked, then restores the base pose.
 void Probe::add_column(std::uint32_t control, double step, Jacobian& out) {
   constexpr std::size_t kNumbers = 3 * Jacobian::kBlock;
   for (const std::uint32_t p : marked_) {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Probe: some points of a skin, where raw controls bring them and what each control does to them.
+// Probe: positions of some points of a skin under raw controls, and their derivatives.
 //
-// Derivatives are differences of the evaluated rig, one evaluation a control, so that correctives,
-// solvers and networks count. An evaluation takes microseconds; what costs is the skin behind it.
-// So only what a control changed is looked at: joints whose numbers are others than before and
-// those below them, and the points that hang on these.
+// Derivatives are differences of the evaluated rig, one evaluation per control, so that they
+// include correctives, solvers and networks. An evaluation takes microseconds; the skinning behind
+// it would cost more. Therefore only changes are skinned: the joints whose numbers changed, their
+// descendants, and the points that depend on these joints.
 #pragma once
 
 #include <span>
@@ -19,12 +19,12 @@ struct Point {
   std::uint32_t mesh, vertex;
 };
 
-/// How far a control is moved for a difference. The rig's numbers are float32, so that a derivative
-/// has an error of about 2^-24 / kStep of the largest value.
+/// The step of a control for a difference. The rig's numbers are float32, so that a derivative has
+/// an error of about 2^-24 / kStep of the largest value.
 inline constexpr double kStep = 1.0 / 256;
 
-/// The Jacobian, in blocks of kBlock neighbouring points: a block has the controls that move any of
-/// its points, and of each kBlock * 3 numbers.
+/// The Jacobian, in blocks of kBlock neighbouring points. A block lists the controls that move any
+/// of its points, each with kBlock * 3 numbers.
 struct Jacobian {
   static constexpr std::size_t kBlock = 32;
   struct Block {
@@ -35,7 +35,7 @@ struct Jacobian {
   std::vector<Block> blocks;
 };
 
-/// Points and the memory to work with them. Not for two threads at a time.
+/// Points and scratch memory. Not thread-safe.
 class Probe {
  public:
   /// In: points  each within its mesh; the surface outlives the probe
@@ -46,14 +46,14 @@ class Probe {
   /// Out: out  float64[points, 3], file units
   void positions(const float* raw, double* out);
   /// In: raw   float32[R], the pose
-  ///     high  float32[R]: a control that has no room up to here is moved down
-  ///     free  [R]: controls at 0 are left out
+  ///     high  float32[R]: a control whose step would exceed it is moved down instead
+  ///     free  [R]: controls with 0 are left out
   Jacobian jacobian(const float* raw, const float* high, const std::uint8_t* free);
 
  private:
   struct Joint {
     std::uint32_t index;   // in the file
-    std::uint32_t parent;  // in joints_, itself for a root
+    std::uint32_t parent;  // index in joints_; a root is its own parent
   };
   static constexpr std::size_t kFrames = 16;
 
@@ -67,22 +67,22 @@ class Probe {
   void add_column(std::uint32_t control, double step, Jacobian& out);
 
   const Surface& surface_;
-  std::vector<Joint> joints_;            // that the points need, parents first
-  std::vector<std::uint32_t> channels_;  // likewise
+  std::vector<Joint> joints_;            // joints that the points need, parents first
+  std::vector<std::uint32_t> channels_;  // channels that the points need
   std::vector<std::array<float, 3>> points_;
   std::vector<std::uint32_t> influence_begins_, shape_begins_;  // [points + 1]
-  std::vector<Influence> influences_;                           // joint: in joints_
-  std::vector<Shape> shapes_;                                   // channel: in channels_
-  // Points by what moves them.
+  std::vector<Influence> influences_;                           // joint: index in joints_
+  std::vector<Shape> shapes_;                                   // channel: index in channels_
+  // The points that each joint and each channel moves.
   std::vector<std::uint32_t> joint_users_begins_, joint_users_, channel_users_begins_,
       channel_users_;
 
-  // The pose that the derivatives are taken at.
+  // The base pose of the derivatives.
   std::vector<float> deltas_;   // [joints_, 9]
   std::vector<float> weights_;  // [channels_]
   std::vector<Matrix> world_, skin_;
   std::vector<std::array<double, 3>> base_;  // [points_]
-  // Another pose beside it.
+  // The pose with one control moved.
   std::vector<Matrix> other_world_, other_skin_;
   std::vector<float> other_weights_;
   std::vector<std::uint8_t> moved_;      // [joints_]

@@ -34,7 +34,7 @@ Status check_fit(const dna::Dna& dna, const rig::Rig& rig, std::uint32_t lod) {
   return core::ok();
 }
 
-/// Joints, parents first. The tree has no cycles: validate() has seen to it.
+/// Sorts joints so that parents come first. validate() has excluded cycles.
 std::vector<std::uint32_t> parents_first(const std::vector<std::uint32_t>& parents) {
   std::vector<std::uint32_t> order, chain;
   std::vector<bool> done(parents.size(), false);

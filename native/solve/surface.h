@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Surface: the skins of a face, ready to be asked where a pose of its rig brings a vertex.
+// Surface: the skins of a face, prepared to compute where a pose of its rig moves a vertex.
 #pragma once
 
 #include <array>
@@ -13,21 +13,20 @@
 
 namespace risorius::solve {
 
-/// Rows of a 3x4 matrix: what takes a column vector.
+/// Three rows of four of an affine matrix for column vectors.
 using Matrix = std::array<double, 12>;
 
 struct Influence {
   std::uint32_t joint;
   float weight;
 };
-/// What a blend shape channel at 1 adds to a vertex before it is skinned.
+/// The displacement that a blend shape channel at 1 adds to a vertex before skinning.
 struct Shape {
   std::uint32_t channel;
   std::array<float, 3> delta;
 };
 
-/// A mesh of the file, by vertex: what belongs to vertex v lies between begins[v] and begins[v +
-/// 1].
+/// A mesh of the file by vertex: the entries of vertex v are [begins[v], begins[v + 1]).
 struct SkinMesh {
   std::vector<std::array<float, 3>> positions;  // file units
   std::vector<std::uint32_t> influence_begins;
@@ -39,21 +38,21 @@ struct SkinMesh {
 struct Surface {
   std::shared_ptr<const rig::Rig> rig;
   std::uint32_t lod = 0;
-  std::vector<std::uint32_t> parents;   // a root is its own
+  std::vector<std::uint32_t> parents;   // a root is its own parent
   std::vector<std::uint32_t> order;     // joints, parents first
-  std::vector<Matrix> neutral_inverse;  // of each joint's place in the neutral pose
+  std::vector<Matrix> neutral_inverse;  // of each joint's transform in the neutral pose
   std::vector<SkinMesh> meshes;
 };
 
-/// Copies what is needed of a face. A vertex without weights stays where its shapes bring it.
+/// Copies the needed parts of a face. A vertex without weights is moved by its shapes only.
 /// In:     rig  compiled from dna, with Euler angles as rotation
 ///         lod  below the number of LODs
-/// Errors: as of dna::validate; invalid_argument: a rig or a LOD that does not fit
+/// Fails:  as dna::validate; invalid_argument (a rig or a LOD that does not fit)
 core::Result<Surface> make_surface(const dna::Dna& dna, std::shared_ptr<const rig::Rig> rig,
                                    std::uint32_t lod);
 
-/// A joint's place in its parent.
-/// In: delta  its nine numbers of a Pose
+/// A joint's transform relative to its parent.
+/// In: delta  the joint's nine numbers of a Pose
 Matrix local_matrix(const rig::Rig& rig, std::uint32_t joint, const float* delta);
 /// a * b: b acts first.
 Matrix multiply(const Matrix& a, const Matrix& b);

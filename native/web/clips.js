@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Takes and sounds that are dropped on a face, as its player has them: .csv, .rzc, and sounds.
+// Takes and sounds that the user drops on a face: .csv, .rzc and sounds.
 import { FaceError } from "./library.js";
 
 const RATE = 60;
@@ -23,7 +23,7 @@ function cells(line, delimiter) {
   return [...found, cell].map((text) => text.trim());
 }
 
-/** Seconds of hours:minutes:seconds:frames. In: cells of one column. */
+/** Seconds from hours:minutes:seconds:frames. In: cells of one column. */
 function timecodes(column) {
   const parts = column.map((text) => text.split(/[:;]/).map(Number));
   const most = parts.reduce((high, part) => Math.max(high, part[3] ?? 0), 0);
@@ -40,7 +40,7 @@ function timesOf(header, rows, name) {
   return column.map((text) => factor * Number(text.replace(",", ".")));
 }
 
-/** A table with a column for each curve, and one of times. */
+/** A table with a column per curve and one of times. */
 function tableOf(text, name) {
   const lines = text.replace(/^\uFEFF/, "").split(/\r?\n/).filter((line) => line.trim() && !/^(#|\/\/|%|sep=)/i.test(line));
   if (lines.length < 2) throw new FaceError(`${name}: a header and a row at least were expected, found ${lines.length} lines`);
@@ -55,7 +55,7 @@ function tableOf(text, name) {
   return { names: kept.map((i) => header[i]), curves: kept.map((i) => curves[i]), times };
 }
 
-/** How loud a sound is, as a jaw that opens, and how sharp, as lips that spread or round. */
+/** Loudness of a sound as jaw opening, and brightness as spread or rounded lips. */
 async function loudness(file) {
   const context = new OfflineAudioContext(1, 1, 16000);
   let sound;
@@ -93,7 +93,7 @@ async function loudness(file) {
   };
 }
 
-/** Curves of a file as sums of raw controls and angles. */
+/** Curves of a file as weighted sums of raw controls and angles. */
 function mapped({ names, curves }, { rows, shares }, controls) {
   const own = new Map(controls.map((name, i) => [name, i]));
   const known = new Map(Object.entries(rows).map(([name, row]) => [loose(name), row]));
@@ -116,7 +116,7 @@ function mapped({ names, curves }, { rows, shares }, controls) {
   return sums;
 }
 
-/** A head's or a neck's rotation about the face's axes: yaw about z, pitch about -x, roll about y. */
+/** Rotation of head or neck about the face's axes: yaw about z, pitch about -x, roll about y. */
 function turnOf([yaw, pitch, roll], share) {
   const [sy, sp, sr] = [yaw, pitch, roll].map((angle) => Math.sin(angle / 2));
   const [cy, cp, cr] = [yaw, pitch, roll].map((angle) => Math.cos(angle / 2));
@@ -129,7 +129,7 @@ function turnOf([yaw, pitch, roll], share) {
   return [...q.slice(0, 3).map((part) => (sine > 0 ? (part / sine) * Math.sin(half) : 0)), Math.cos(half)];
 }
 
-/** Columns of the joints that neck and head turn, and of the raw controls that hold their rotation. */
+/** Columns of the neck and head joints, and of the raw controls that hold their rotation. */
 function addTurns(sums, bones, count) {
   const turns = [];
   for (const { joint, bone, share, axes, controls } of bones) {
@@ -147,7 +147,7 @@ function addTurns(sums, bones, count) {
   return turns;
 }
 
-/** A curve at even times. */
+/** A curve resampled at even times. */
 function resampled(curve, times, count, rate) {
   const out = new Float32Array(count);
   for (let f = 0, i = 0; f < count; ++f) {
@@ -161,7 +161,7 @@ function resampled(curve, times, count, rate) {
   return out;
 }
 
-/** In: what a file holds, the table of the page, names of the raw controls, the file's name.
+/** In: content of a file, table of the page, names of raw controls, file name.
  * Out: the clip and its values, see player.js. */
 export function clipOf(found, { captures, bones }, controls, name) {
   const { times } = found;

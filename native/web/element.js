@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// <risorius-face>: a face of `risorius web FACE.dna -o face.js` on a page of the user's own.
+// <risorius-face>: a face of `risorius web FACE.dna -o face.js` on the user's own page.
 import { inScript } from "./content.js";
 import { FaceError } from "./library.js";
 import { Viewer, sentence } from "./viewer.js";
@@ -20,7 +20,7 @@ p { position: absolute; inset: 40% 0 auto; margin: 0; padding: 0 16px; text-alig
 
 class RisoriusFace extends HTMLElement {
   connectedCallback() {
-    if (this.shadowRoot) return void this.viewer?.turn(); // put back on its page
+    if (this.shadowRoot) return void this.viewer?.turn(); // the element was put back on its page
     const root = this.attachShadow({ mode: "open" });
     root.innerHTML = INSIDE;
     this.addEventListener("dragover", (event) => event.preventDefault());
@@ -28,7 +28,7 @@ class RisoriusFace extends HTMLElement {
       event.preventDefault();
       this.playFiles(event.dataTransfer.files).catch((error) => this.say(error));
     });
-    /** Settled when the face is shown. */
+    /** Resolves when the face is shown. */
     this.ready = this.open();
     this.ready.catch((error) => this.say(error));
   }
@@ -57,7 +57,7 @@ class RisoriusFace extends HTMLElement {
   pause() {
     this.viewer.player.pause();
   }
-  /** In: a list of File, a take and its sound. */
+  /** In: a list of File: a take and its sound. */
   playFiles(files) {
     return this.viewer.play(files);
   }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Meshes out of the lists that native/python/risorius/web/geometry.py wrote.
+// Decodes the lists that native/python/risorius/web/geometry.py wrote.
 
 class Streams {
   constructor(bytes) {
     this.bytes = bytes;
     this.at = 0;
   }
-  /** The next list. In: length, bytes of a number, how far back the number lies that it is counted from. */
+  /** The next list. In: length, bytes per number, distance between a difference and its base (0: no differences). */
   next([count, width, stride]) {
     const out = new Int32Array(count);
     const { bytes, at } = this;
@@ -20,20 +20,20 @@ class Streams {
     this.at += count * width;
     return out;
   }
-  /** A list of steps, by axis. */
+  /** A list of steps, per axis. */
   scaled([step, ...how]) {
     return Float32Array.from(this.next(how), (whole) => whole * step);
   }
 }
 
-/** Sums of all numbers before each, and of all. */
+/** Sums of all numbers before each number, and the sum of all. */
 function begins(counts) {
   const out = new Uint32Array(counts.length + 1);
   for (let i = 0; i < counts.length; ++i) out[i + 1] = out[i] + counts[i];
   return out;
 }
 
-/** Three numbers of each place beside each other, with one more: 4 to a place. */
+/** Three numbers per place, padded to four. */
 function fours(byAxis, factor, last = 0) {
   const count = byAxis.length / 3;
   const out = new Float32Array(4 * count);
@@ -88,13 +88,13 @@ function mesh(about, streams) {
   return out;
 }
 
-/** [a, b, c, a, b, c, ...] as all a, all b, all c. */
+/** Turns [a, b, c, a, b, c, ...] into all a, all b, all c. */
 function byAxisOf(list) {
   const count = list.length / 3;
   return Float32Array.from(list, (_, i) => list[3 * (i % count) + Math.floor(i / count)]);
 }
 
-/** In: the table's meshes, bytes of "geometry". Out: meshes by their number in the file. */
+/** In: meshes of the table, bytes of "geometry". Out: meshes by their number in the file. */
 export function unpack(abouts, bytes) {
   const streams = new Streams(bytes);
   return new Map(abouts.map((about) => [about.index, { ...mesh(about, streams), kind: about.kind, material: about.material }]));

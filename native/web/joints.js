@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-// From the joint values of a pose to matrices that move vertices.
+// Matrices that move vertices, from the joint values of a pose.
 import { Matrix4, Quaternion, Vector3 } from "three";
 
 const AXES = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-// Left and right of who looks at the face: 0 left 1 right 2 up 3 down 4 front 5 back.
+// Left and right from the viewer's side: 0 left 1 right 2 up 3 down 4 front 5 back.
 const DIRECTIONS = [[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
 const UNITS = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
 
-/** Takes the file's axes and units to the scene: metres, x to the right of who looks, y up, z front. */
+/** Converts the file's axes and units to the scene: metres, x to the viewer's right, y up, z to the front. */
 export function toScene(skeleton) {
   const scale = skeleton.inMetres ? 1 : 0.01;
   return new Matrix4().makeBasis(
@@ -44,7 +44,7 @@ export class Joints {
     return order;
   }
 
-  /** Turns of neck and head, which no pose has. In: [joint, [x, y, z, w]] against rest. */
+  /** Rotations of neck and head, which no pose has. In: [joint, [x, y, z, w]] relative to rest. */
   turn(pairs) {
     this.turns.clear();
     for (const [joint, q] of pairs) {
@@ -52,7 +52,7 @@ export class Joints {
     }
   }
 
-  /** A joint's rotation against its parent. In: as place; out: a Quaternion that is written to. */
+  /** Rotation of a joint relative to its parent. In: the same as place; out: a Quaternion, is written. */
   rotationOf(j, values, out) {
     const { neutral, stride, inRadians, order, signs } = this.skeleton;
     const turn = this.parts[3];
@@ -84,8 +84,8 @@ export class Joints {
     }
   }
 
-  /** What takes a vertex at rest along with each joint, into the scene; behind them what is still.
-   * In: values as place; out: float32[joints + 1, 16], columns, and which of them are other now. */
+  /** Matrices from rest to the pose in the scene, per joint; the last one moves still vertices into the scene.
+   * In: the same as place; out: float32[joints + 1, 16], columns, and a flag per matrix that changed. */
   pose(values, out, changed) {
     this.place(values);
     const product = new Matrix4();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// risorius.h in JavaScript: the C API that was compiled to WebAssembly. Offsets are those of its
-// structs with pointers of 4 bytes.
+// risorius.h in JavaScript: the C API compiled to WebAssembly. Struct offsets are for pointers of
+// 4 bytes.
 
 export const List = { RAW: 0, GUI: 1, JOINTS: 2, SHAPES: 3, MAPS: 4, MESHES: 5, LODS: 6 };
 const NO_GEOMETRY = 0;
@@ -8,7 +8,7 @@ const ABI = 1;
 
 export class FaceError extends Error {}
 
-/** What the C++ library asks of its system: nothing but time, chance and an end. */
+/** The system calls of the C++ library: only time, random numbers and exit. */
 function system(memory) {
   const enosys = () => 52;
   const calls = {
@@ -27,7 +27,7 @@ function system(memory) {
 }
 
 export class Library {
-  /** In: bytes of risorius.wasm. Throws FaceError where the browser lacks what they need. */
+  /** In: bytes of risorius.wasm. Throws FaceError if the browser lacks a needed feature. */
   static async load(bytes) {
     const library = new Library();
     let module;
@@ -53,7 +53,7 @@ export class Library {
   numbers(Type, pointer, count) {
     return new Type(this.c.memory.buffer, pointer, count);
   }
-  /** A copy: views end when the memory grows. */
+  /** A copy, because views become invalid when the memory grows. */
   copy(Type, pointer, count) {
     return pointer === 0 ? new Type(0) : this.numbers(Type, pointer, count).slice();
   }
@@ -62,13 +62,13 @@ export class Library {
     if (pointer === 0 && size > 0) throw new FaceError("The browser gives no more memory.");
     return pointer;
   }
-  /** A copy of an array that stays, on a border of 16 bytes. Out: where it lies. */
+  /** Copies an array into permanent memory, aligned to 16 bytes. Out: its address. */
   place(array) {
     const at = (this.reserve(array.byteLength + 16) + 15) & ~15;
     this.numbers(Uint8Array, at, array.byteLength).set(new Uint8Array(array.buffer, array.byteOffset, array.byteLength));
     return at;
   }
-  /** A clip out of the bytes of a .rzc file: {rate, start, names, curves: [Float32Array], times}. */
+  /** Reads a clip from the bytes of a .rzc file: {rate, start, names, curves: [Float32Array], times}. */
   clip(bytes) {
     return this.with(bytes.length, (data) => {
       this.numbers(Uint8Array, data, bytes.length).set(bytes);
@@ -93,7 +93,7 @@ export class Library {
       };
     });
   }
-  /** Calls body with memory that is free again afterwards. */
+  /** Calls body with memory that is freed afterwards. */
   with(size, body) {
     const pointer = this.reserve(size);
     try {
@@ -141,7 +141,7 @@ class Face {
     const name = (_, i) => this.library.text(this.library.c.risorius_name(this.pointer, list, i));
     return Array.from({ length: this.count(list) }, name);
   }
-  /** Indices of the list that a LOD has. */
+  /** Indices in the list of a LOD. */
   itemsOf(list, lod) {
     const { library } = this;
     return library.with(8, (out) => {
@@ -184,7 +184,7 @@ class Instance {
     this.pointer = pointer;
     this.room = library.reserve(4);
   }
-  /** In: values of the raw controls from the first on. */
+  /** In: values of the raw controls, starting with the first. */
   setRaw(values) {
     const { library } = this;
     library.with(4 * values.length, (at) => {
@@ -198,7 +198,7 @@ class Instance {
   evaluate() {
     this.library.check(this.library.c.risorius_evaluate(this.pointer));
   }
-  /** A view, until the next call. */
+  /** A view, valid until the next call. */
   values(list) {
     const at = this.library.c.risorius_values(this.pointer, list, this.room);
     if (at === 0) throw new FaceError(this.library.lastError());

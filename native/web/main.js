@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The page: a face, its sliders, its levels of detail, a clip. And <risorius-face>, which pages of others
-// have (element.js).
+// The page: a face, its sliders, its LODs and a clip. Also <risorius-face> for other pages
+// (element.js).
 import { inPage } from "./content.js";
 import { define } from "./element.js";
 import { Panel } from "./panel.js";

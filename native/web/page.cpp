@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What the page needs beside risorius.h: a mesh moved with its normals, and .rzc files. One thread
-// calls all of it; arrays are the page's and lie in this memory.
+// Functions that the web page needs in addition to risorius.h: deforming a mesh with its normals,
+// and reading .rzc files. Called from one thread; the page owns the arrays, which lie in this
+// memory.
 #include <cmath>
 #include <cstdint>
 #include <span>
@@ -15,11 +16,11 @@ namespace {
 
 using Four = float __attribute__((vector_size(16), aligned(16)));
 
-// skin.js fills it: 22 words.
+// Filled by skin.js: 22 words.
 struct PageMesh {
   std::uint32_t positions, vertices, triangles, targets;
   const Four* rest;               // [positions]
-  const std::uint32_t* source;    // [vertices]: the position that each shows
+  const std::uint32_t* source;    // [vertices]: index of the position of each vertex
   const std::uint32_t* corners;   // [3 * triangles]: positions
   const std::uint32_t* begins;    // [positions + 1]: influences
   const std::uint32_t* joints;    // [influences]
@@ -28,7 +29,7 @@ struct PageMesh {
   const std::uint32_t* channels;  // [targets]
   const std::uint32_t* moves;     // [moved]: positions
   const Four* deltas;             // [moved]
-  const Four* normals;            // [positions] at rest; null: those of the triangles
+  const Four* normals;            // [positions] at rest; null: computed from the triangles
   Four* shaped;                   // [positions]
   Four* placed;                   // [positions]
   Four* turned;                   // [positions]
@@ -53,7 +54,7 @@ void add_shapes(const PageMesh& mesh, const float* channels) {
   }
 }
 
-// matrices: four columns for each joint.
+// In: matrices  four columns for each joint
 void add_joints(const PageMesh& mesh, const Four* matrices) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) {
     Four x{}, y{}, z{}, w{};
@@ -73,7 +74,7 @@ void add_joints(const PageMesh& mesh, const Four* matrices) {
   }
 }
 
-// A triangle counts by its area.
+// The normal of a triangle counts by its area.
 void find_normals(const PageMesh& mesh) {
   for (std::uint32_t v = 0; v < mesh.positions; ++v) mesh.turned[v] = Four{};
   for (std::uint32_t i = 0; i < 3 * mesh.triangles; i += 3) {
@@ -106,7 +107,7 @@ struct PageClip {
   const char* names;    // each ends with 0
   const float* curves;  // [controls, frames]
   const double* times;  // [frames], or null
-  const char* error;    // null: there is a clip
+  const char* error;    // null: the clip was read
 };
 
 }  // namespace
@@ -118,10 +119,10 @@ PAGE_API void page_pose(const PageMesh* mesh, const float* matrices, const float
   write_out(*mesh);
 }
 
-/// A whole .rzc file; what it holds stays until the next call.
+/// Reads a whole .rzc file; the result is valid until the next call.
 PAGE_API const PageClip* page_clip(const std::uint8_t* bytes, std::uint32_t size) {
   static risorius::clip::Clip clip;
-  static std::string names;  // or what is wrong
+  static std::string names;  // or the error text
   static PageClip page;
   page = {};
   auto read = risorius::clip::decode({bytes, size});

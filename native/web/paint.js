@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What Blender paints by nodes on surfaces without pictures (addon/risorius/scene/material): the same
-// numbers, by vertex. All colours are linear.
+// Colours of surfaces without textures, per vertex, with the same numbers as Blender's nodes
+// (addon/risorius/scene/material). All colours are linear.
 import { BufferAttribute } from "three";
 
 const ENAMEL = [[0.35, [0.74, 0.66, 0.53]], [1.0, [0.62, 0.47, 0.29]]];
@@ -8,7 +8,7 @@ const GUM = [[0.3, [0.28, 0.065, 0.06]], [0.7, [0.44, 0.14, 0.12]]];
 const TONGUE = [[0.3, [0.3, 0.065, 0.065]], [0.7, [0.45, 0.15, 0.14]]];
 const CARUNCLE = [[0.3, [0.44, 0.15, 0.13]], [0.7, [0.58, 0.27, 0.23]]];
 const SKIN = [[0.32, [0.5, 0.26, 0.18]], [0.68, [0.6, 0.35, 0.25]]];
-// Lips and cheeks keep light from what lies deep in a mouth.
+// Lips and cheeks shade the back of the mouth.
 const SHADED = [[0.12, [1, 1, 1]], [0.24, [0.77, 0.75, 0.73]], [0.35, [0.46, 0.42, 0.39]], [0.62, [0.18, 0.13, 0.11]]];
 const LIPS = [0.42, 0.13, 0.11];
 const INSIDE = [0.16, 0.04, 0.035];
@@ -27,7 +27,7 @@ const chance = (x, y, z) => {
   const wave = Math.sin(x * 127.1 + y * 311.7 + z * 74.7) * 43758.5453;
   return wave - Math.floor(wave);
 };
-/** Noise from 0 to 1, its mean near 0.5. */
+/** Noise from 0 to 1, with a mean near 0.5. */
 function noise(p, scale, octaves = 2) {
   let sum = 0;
   let all = 0;
@@ -58,12 +58,12 @@ const boxOf = (points) => {
 };
 const middleOf = ({ min, max }) => min.map((low, k) => (low + max[k]) / 2);
 
-/** Places of a mesh at rest in the scene: metres, x to the right of who looks, y up, z front. */
+/** Places of a mesh at rest in the scene: metres, x to the viewer's right, y up, z to the front. */
 export function places({ out, mesh }) {
   return Array.from(mesh.source, (_, v) => [...out.array.subarray(6 * v, 6 * v + 3)]);
 }
 
-/** Left and right balls of a mesh: one mesh may hold both. */
+/** Left and right balls of a mesh; one mesh may hold both. */
 function balls(points) {
   const box = boxOf(points);
   const wide = box.max[0] - box.min[0] > 1.6 * (box.max[1] - box.min[1]);
@@ -71,7 +71,7 @@ function balls(points) {
   return points.map((p) => (wide && p[0] > middle ? 1 : 0));
 }
 
-/** The measure of all patterns: the distance of the eyes. In: parts of one level. */
+/** The unit of all patterns: the distance between the eyes. In: parts of one LOD. */
 export function faceOf(parts) {
   const eyes = parts.filter(({ skin }) => skin.mesh.kind === "eyes");
   const middles = eyes.flatMap(({ skin }) => {
@@ -106,7 +106,7 @@ function skinOf(unit, mouth) {
     const wide = (mouth.max[0] - mouth.min[0]) / 2 / unit;
     const deep = (mouth.max[2] - mouth.min[2]) / unit;
     const back = (p[2] - mouth.max[2]) / unit;
-    const arch = -0.04 - deep * (x / wide) ** 2; // teeth stand in a bow: what is behind it is in the mouth
+    const arch = -0.04 - deep * (x / wide) ** 2; // teeth form an arch: everything behind it is in the mouth
     if (Math.abs(y) < 0.5 && back < arch && back > -deep - 0.3) return INSIDE;
     const front = back > -0.12;
     const near = front ? Math.exp(-((x / 0.4) ** 4) - ((y / 0.19) ** 4)) : 0;
@@ -114,8 +114,8 @@ function skinOf(unit, mouth) {
   };
 }
 
-/** A colour for each vertex of a mesh that has no picture; null where its material has one colour.
- * In: skin at rest, the name of its mesh, faceOf. */
+/** Vertex colours of a mesh without a texture; null if its material has one colour.
+ * In: skin at rest, name of its mesh, faceOf. */
 export function colorsOf(skin, name, { unit, mouth }) {
   const { kind } = skin.mesh;
   const points = places(skin);
@@ -138,7 +138,7 @@ export function colorsOf(skin, name, { unit, mouth }) {
   return new BufferAttribute(colors, 3);
 }
 
-/** Where a vertex lies on its eye: across and up over the ball's radius, 1 on the front half. */
+/** Place of a vertex on its eye: across and up, divided by the ball's radius; 1 on the front half. */
 export function eyePlaces(skin) {
   const points = places(skin);
   const sides = balls(points);

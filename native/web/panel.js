@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Sliders by region, and a search among them.
+// Sliders by region, and a search field.
 
 const other = (name) => {
   if (/L$/.test(name)) return name.replace(/L$/, "R");
   return /R$/.test(name) ? name.replace(/R$/, "L") : null;
 };
-/** `mouthCornerPullL` as people read it: Mouth Corner Pull L. */
+/** Display name of `mouthCornerPullL`: Mouth Corner Pull L. */
 const spoken = (name) => {
   const last = name.split(/[.:|]/).pop() || name;
   const words = last.replace(/([a-z0-9])([A-Z])/g, "$1 $2").replace(/_/g, " ");

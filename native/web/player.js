@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A clip on the face, with its sound.
+// Plays a clip on the face with its sound.
 
 export class Player {
   /** In: the bar with #play, #time and #clock; shown([[control, value]], [[joint, quaternion]]). */
@@ -53,7 +53,7 @@ export class Player {
     this.button.setAttribute("aria-label", this.playing ? "Pause" : "Play");
   }
 
-  /** The second of the clip that is heard or shown now. The sound has the clock while it plays. */
+  /** The current second of the clip. While the sound plays, it is the clock. */
   now() {
     const { audio } = this;
     const time = performance.now() / 1000 - this.began;
@@ -65,22 +65,22 @@ export class Player {
     }
     if (at >= 0 && at < (audio.duration || 0) && !this.isMute) {
       audio.currentTime = at;
-      audio.play().catch(() => (this.isMute = true)); // a browser may refuse; the face goes on
+      audio.play().catch(() => (this.isMute = true)); // the browser may refuse sound; the face plays on
     }
     return time;
   }
 
-  /** Called for every picture. */
+  /** Called once per picture. */
   step() {
     if (!this.playing) return;
     const time = this.now();
     this.seek(Math.min(time, this.length));
     if (time < this.length) return;
     this.pause();
-    this.play(); // round and round
+    this.play(); // loop
   }
 
-  /** Between two frames values are mixed. */
+  /** Interpolates between two frames. */
   seek(time) {
     if (!this.clip) return;
     this.time = time;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A mesh that moves: shapes, then joints, then normals, by page.cpp in the library's memory. Any number
-// of influences and shapes.
+// A moving mesh: shapes, then joints, then normals, by page.cpp in the library's memory. Influences
+// and shapes are unlimited.
 import { BufferAttribute, BufferGeometry, InterleavedBuffer, InterleavedBufferAttribute } from "three";
 
 export class Skin {
-  /** In: the library; a mesh of geometry.js; joints: how many; mirrors: whether the scene's axes do. */
+  /** In: the library; a mesh of geometry.js; number of joints; whether the scene's axes mirror. */
   constructor(library, mesh, joints, mirrors) {
     this.library = library;
     this.mesh = mesh;
@@ -28,7 +28,7 @@ export class Skin {
     this.geometry.setAttribute("normal", new InterleavedBufferAttribute(this.out, 3, 3));
   }
 
-  /** A mesh without weights hangs on what stands still: the matrix behind those of the joints. */
+  /** A mesh without weights uses the last matrix, behind the matrices of the joints. */
   hang(joints) {
     const { mesh } = this;
     mesh.influences = Uint32Array.from({ length: this.count + 1 }, (_, i) => i);
@@ -36,7 +36,7 @@ export class Skin {
     mesh.weights = new Float32Array(this.count).fill(1);
   }
 
-  /** Whether the polygons show their backs: files wind them both ways, and axes may mirror. */
+  /** Whether to reverse the polygons: files use both windings, and axes may mirror. */
   turnsInside(mirrors) {
     const { positions: p } = this.mesh;
     const middle = [0, 1, 2].map((k) => {
@@ -55,8 +55,8 @@ export class Skin {
     return mirrors ? volume > 0 : volume < 0;
   }
 
-  /** Cards lie around a head: drawn from the innermost out, they cover each other as hair does from
-   * wherever they are seen, and need no sorting for each picture. */
+  /** Cards lie around a head. Drawn from the innermost to the outermost, they cover each other as hair does from
+   * every side, and need no sorting per picture. */
   innerFirst() {
     const { positions: p, index } = this.mesh;
     const sum = [0, 0, 0];
@@ -75,7 +75,7 @@ export class Skin {
     [this.mesh.index, this.corners] = [sorted(index), sorted(this.corners)];
   }
 
-  /** Everything that page.cpp reads, into its memory: PageMesh. */
+  /** Writes PageMesh, the input of page.cpp, into the library's memory. */
   place() {
     const { library, mesh, count } = this;
     const vertices = mesh.source.length;
@@ -93,8 +93,8 @@ export class Skin {
     return this.library.numbers(Float32Array, this.shown, 6 * this.mesh.source.length);
   }
 
-  /** In: where matrices (16 floats a joint) and channels lie in the library's memory; which of both
-   * are other than at the last call, or null for all. */
+  /** In: addresses of matrices (16 floats per joint) and channels in the library's memory; flags of matrices
+   * and channels that changed since the last call, or null for all. */
   pose(matrices, channels, changed) {
     const moves =
       changed === null ||
@@ -102,7 +102,7 @@ export class Skin {
       this.shapes.some((shape) => changed.shapes[shape]);
     if (!moves) return false;
     this.library.c.page_pose(this.at, matrices, channels);
-    this.out.array = this.view(); // memory that grew has another place
+    this.out.array = this.view(); // the memory may have moved when it grew
     this.out.needsUpdate = true;
     return true;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Light and camera: a portrait.
+// Light and camera of a portrait.
 import {
   AgXToneMapping, Box3, DirectionalLight, Group, HemisphereLight, PCFSoftShadowMap,
   PerspectiveCamera, PMREMGenerator, Scene, Vector3, WebGLRenderer,
@@ -15,7 +15,7 @@ export class Stage {
     this.renderer.toneMapping = AgXToneMapping;
     this.renderer.toneMappingExposure = 1.0;
     this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.autoUpdate = false; // lights stand still: who walks round a face needs none anew
+    this.renderer.shadowMap.autoUpdate = false; // lights do not move, so the shadow map stays valid while the camera moves
     this.moved = true;
     this.renderer.shadowMap.type = PCFSoftShadowMap;
     this.scene = new Scene();
@@ -33,7 +33,7 @@ export class Stage {
     this.dirty = true;
   }
 
-  /** A warm key from the left of who looks, a cool rim from behind, little from everywhere: as the studio in Blender. */
+  /** A warm key light from the viewer's left, a cool rim light from behind, a little from everywhere: the studio of the add-on. */
   light(size) {
     const at = (x, y, z) => this.middle.clone().add(new Vector3(x, y, z).multiplyScalar(size));
     const lamp = (color, strength, place) => {
@@ -45,7 +45,7 @@ export class Stage {
     };
     const key = lamp(0xffe9d2, 3.6, at(-1.6, 1.5, 2.0));
     const rim = lamp(0xcfe0ff, 1.8, at(1.3, 1.2, -2.4));
-    // Without shadows the rim light would shine through the head, onto the far side of the nose.
+    // Without shadows the rim light would shine through the head onto the far side of the nose.
     for (const [light, side] of [[key, 2048], [rim, 1024]]) {
       light.castShadow = true;
       light.shadow.mapSize.set(side, side);
@@ -60,11 +60,11 @@ export class Stage {
     this.scene.add(new HemisphereLight(0xdfe8f5, 0x5a463c, 0.12));
   }
 
-  /** Looks at the face from the front. */
+  /** Points the camera at the face from the front. */
   frame() {
     const box = new Box3().setFromObject(this.face);
     const height = box.max.y - box.min.y;
-    // A bust reaches down to the chest: the face is in its upper half.
+    // A bust reaches down to the chest, so the face is in its upper half.
     this.middle = new Vector3((box.min.x + box.max.x) / 2, box.max.y - 0.42 * Math.min(height, 0.36),
       (box.min.z + box.max.z) / 2);
     this.size = Math.min(height, 0.4);

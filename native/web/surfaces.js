@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Materials by the kind of their mesh, with the pictures that there are.
+// Materials by the kind of mesh, with its textures.
 import {
   AdditiveBlending, Color, DoubleSide, Mesh, MeshPhysicalMaterial, NoColorSpace, ShaderChunk,
   SRGBColorSpace, Texture,
@@ -9,7 +9,7 @@ import { Wrinkles } from "./wrinkles.js";
 
 const linear = (r, g, b) => new Color().setRGB(r, g, b);
 
-/** A chunk of three.js with some of it replaced; a three.js that has it no more says so at once. */
+/** A chunk of three.js with a part replaced; throws at once if this three.js lacks the part. */
 function replaced(source, ...pairs) {
   for (const [from, to] of pairs) {
     if (!source.includes(from)) throw new Error(`three.js has no ${JSON.stringify(from)} here any more`);
@@ -18,7 +18,7 @@ function replaced(source, ...pairs) {
   return source;
 }
 
-/** Adds to a material's shader. In: a name for the change, pairs for the fragment and vertex shaders. */
+/** Changes the shaders of a material. In: name of the change, pairs for the fragment and vertex shaders. */
 function change(material, name, fragment, vertex = [], uniforms = {}) {
   material.onBeforeCompile = (shader) => {
     Object.assign(shader.uniforms, uniforms);
@@ -28,7 +28,7 @@ function change(material, name, fragment, vertex = [], uniforms = {}) {
   material.customProgramCacheKey = () => name;
 }
 
-// Light wanders in skin: where it ends it is red, and a shadow's edge too.
+// Light scatters in skin: the edges of light and of shadows are red.
 const SOFT_SKIN = replaced(ShaderChunk.lights_physical_pars_fragment,
   ["float dotNL = saturate( dot( geometryNormal, directLight.direction ) );",
     `float dotNL = saturate( dot( geometryNormal, directLight.direction ) );
@@ -39,7 +39,7 @@ const SOFT_SHADOW = replaced(ShaderChunk.lights_fragment_begin,
   ["? getShadow( directionalShadowMap[ i ]", "? pow( vec3( getShadow( directionalShadowMap[ i ]"],
   ["vDirectionalShadowCoord[ i ] ) : 1.0;", "vDirectionalShadowCoord[ i ] ) ), vec3( 0.72, 1.05, 1.12 ) ) : vec3( 1.0 );"]);
 
-// Nothing shades what the room mirrors: the side of a nose would shine through the head, a tongue through lips.
+// Nothing shades reflections of the room: the side of a nose would shine through the head, a tongue through lips.
 const DULL_ROOM = replaced(ShaderChunk.lights_fragment_maps,
   ["radiance += iblRadiance", "radiance += 0.3 * iblRadiance"],
   ["clearcoatRadiance += getIBL", "clearcoatRadiance += 0.3 * getIBL"]);
@@ -58,7 +58,7 @@ function skin(material, wrinkles, sets) {
   ];
   const uniforms = {};
   let name = "skin";
-  // The tone curve takes colour from what is bright.
+  // The tone curve removes colour from bright areas.
   fragment.push(["#include <color_fragment>", `#include <color_fragment>
 	diffuseColor.rgb = max( mix( vec3( dot( diffuseColor.rgb, vec3( 0.2126, 0.7152, 0.0722 ) ) ), diffuseColor.rgb, 1.13 ), 0.0 );`]);
   if (wrinkles && material.map) {
@@ -83,7 +83,7 @@ function skin(material, wrinkles, sets) {
   change(material, name, fragment, [], uniforms);
 }
 
-// The ball is darker under the upper lid and in the corners: lids and lashes keep light from it.
+// Lids and lashes shade the ball below the upper lid and in the corners.
 const LIDS = ["#include <lights_physical_fragment>", `
 	vec3 outward = inverseTransformDirection( normal, viewMatrix );
 	float open = 1.0 - smoothstep( 0.02, 0.62, outward.y ) * 0.62;
@@ -91,7 +91,7 @@ const LIDS = ["#include <lights_physical_fragment>", `
 	diffuseColor.rgb *= vec3( open, mix( 1.0, open, 1.08 ), mix( 1.0, open, 1.12 ) );
 #include <lights_physical_fragment>`];
 
-// Pupil, iris with fibres, limbus and sclera, by the place on the ball.
+// Pupil, iris with fibres, limbus and sclera, by place on the ball.
 const IRIS = ["#include <map_fragment>", `
 	float away = length( eyePlace.xy ) + 2.0 * ( 1.0 - eyePlace.z );
 	vec2 turned = normalize( eyePlace.xy + 1e-5 );
@@ -112,16 +112,16 @@ function eyes(material) {
       ["#include <begin_vertex>", "#include <begin_vertex>\n\teyePlace = place;"]]);
 }
 
-// A card has the skin's normal on both of its sides.
+// Both sides of a card use the skin's normal.
 const OUTWARD = ["#include <normal_fragment_begin>", replaced(ShaderChunk.normal_fragment_begin,
   ["float faceDirection = gl_FrontFacing ? 1.0 : - 1.0;", "float faceDirection = 1.0;"])];
 
-// Hairs are finer than the texels of their picture, and light that goes through them shows their colour.
+// Hairs are finer than texels, and light through them shows their colour.
 const FINE = ["#include <alphamap_fragment>", `#include <alphamap_fragment>
 	diffuseColor.a = pow( diffuseColor.a, 1.2 );
 	diffuseColor.rgb *= 1.4;`];
 
-// Cards without a picture: hairs side by side along them, as Blender's nodes draw lashes.
+// Cards without a texture: hairs side by side along the card, like the add-on's lash nodes.
 const HAIRS = ["#include <alphamap_fragment>", `
 	float hair = 0.0;
 	for ( int i = 0; i < 3; ++ i ) {
@@ -142,14 +142,14 @@ const KINDS = {
   cloth: { color: linear(0.055, 0.065, 0.08), roughness: 0.85, specularIntensity: 0.5 },
   hair: { color: linear(0.06, 0.045, 0.035), roughness: 0.55, metalness: 0.12, specularIntensity: 0.25, side: DoubleSide },
   lashes: { color: linear(0.012, 0.007, 0.005), roughness: 0.6, specularIntensity: 0.3, side: DoubleSide },
-  // Only what it mirrors is seen of a film.
+  // A film shows only its reflection.
   wet: { color: 0x000000, roughness: 0.03, transparent: true, blending: AdditiveBlending, depthWrite: false },
 };
 
 const INSIDE = ["teeth", "tongue", "gum"];
 
 export class Surfaces {
-  /** In: materials and pictures of the table; bytes of all pictures. */
+  /** In: materials and textures of the table; bytes of all textures. */
   constructor({ materials, pictures }, bytes) {
     this.materials = materials;
     this.pictures = [];
@@ -179,7 +179,7 @@ export class Surfaces {
     return this.textures.get(key);
   }
 
-  /** A part's objects. In: the number of its material, the name of its mesh, its skin at rest, the face. */
+  /** Objects of a part. In: number of its material, name of its mesh, its skin at rest, the face. */
   async objects(number, name, own, face) {
     const about = this.materials[number];
     if (about.kind === "eyes" && about.color === undefined) own.geometry.setAttribute("place", eyePlaces(own));
@@ -199,7 +199,7 @@ export class Surfaces {
     });
   }
 
-  /** Of cards two: the inside of hairs that hides what is behind it, and their soft rims over it. */
+  /** Cards have two: the opaque inside of hairs, and their soft rims over it. */
   async material(about) {
     const { kind } = about;
     const settings = { ...KINDS[kind] };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A face on a canvas: evaluated, moved, drawn, with a clip. Pages and <risorius-face> put what they have
-// around it.
+// A face on a canvas: evaluated, moved and drawn, with a clip. The page and <risorius-face> add their own
+// controls.
 import { readClip } from "./clips.js";
 import { unpack } from "./geometry.js";
 import { Joints } from "./joints.js";
@@ -11,9 +11,9 @@ import { Skin } from "./skin.js";
 import { Stage } from "./stage.js";
 import { Surfaces } from "./surfaces.js";
 
-/** In words for people. */
+/** Errors in words for users. */
 export function sentence(error) {
-  // Without exceptions the library ends where it has no memory.
+  // Without exceptions the library aborts when it runs out of memory.
   return error instanceof WebAssembly.RuntimeError
     ? `The face asks for more memory than the browser gives (${error.message}).`
     : `${error?.message ?? error}`;
@@ -26,7 +26,7 @@ export class Viewer {
     this.canvas = canvas;
     this.bar = bar;
     this.cost = { evaluated: 0, moved: 0, drawn: 0 };
-    this.heard = () => {}; // told of each control that a clip moves
+    this.heard = () => {}; // called for each control that a clip moves
   }
 
   async open() {
@@ -53,7 +53,7 @@ export class Viewer {
     this.turn();
   }
 
-  /** Matrices and channels where page.cpp reads them, and which are other than in the last picture. */
+  /** Matrices and channels that page.cpp reads, and the flags of changes since the last picture. */
   makeRooms() {
     const joints = this.joints.skeleton.count + 1;
     const channels = Math.max(this.face.count(List.SHAPES), 1);
@@ -62,7 +62,7 @@ export class Viewer {
     this.changes = { joints: new Uint8Array(joints), shapes: new Uint8Array(channels) };
   }
 
-  /** Meshes of all levels: only those of the one that is shown are moved. */
+  /** Meshes of all LODs; only the meshes of the current LOD are moved. */
   makeSkins(meshes) {
     this.names = this.face.names(List.MESHES);
     this.parts = new Map();
@@ -88,7 +88,7 @@ export class Viewer {
     this.vertices = parts.reduce((sum, part) => sum + part.skin.count, 0);
     this.pose(true);
   }
-  /** Materials are made of the face at rest, when its level is shown first. */
+  /** Materials are made from the face at rest, when its LOD is first shown. */
   async dress(parts) {
     const bare = parts.filter((part) => part.objects === null);
     if (bare.length === 0) return;
@@ -106,7 +106,7 @@ export class Viewer {
     this.player?.seek(this.player.time);
   }
 
-  /** In: whether all meshes are moved, whatever changed. */
+  /** In: whether to move all meshes, changed or not. */
   pose(all = false) {
     const begin = performance.now();
     this.instance.setRaw(this.raw);
@@ -128,7 +128,7 @@ export class Viewer {
     this.stage.dirty = this.stage.moved = true;
   }
 
-  /** In: values by the name of a raw control, with or without what stands before its dot. */
+  /** In: values by raw control name, with or without the part before its dot. */
   set(values) {
     for (const [name, value] of Object.entries(values)) {
       const index = this.controls.findIndex((own) => own === name || own.split(".").pop() === name);
@@ -163,7 +163,7 @@ export class Viewer {
     this.player.load(clip, values, clip.sound);
   }
 
-  /** Plays files that people have: a take as .csv or .rzc, a sound. In: a list of File. */
+  /** Plays files of the user: a take as .csv or .rzc, a sound. In: a list of File. */
   async play(files) {
     const sounds = [...files].filter((file) => /\.(wav|mp3|ogg|m4a)$/i.test(file.name));
     for (const file of files) {
@@ -175,7 +175,7 @@ export class Viewer {
     for (const file of sounds) await this.hear(file);
     this.player.play();
   }
-  /** A sound goes with a clip that has none; alone it opens the mouth as loud as it is. */
+  /** A sound plays with a clip that has none; alone it opens the mouth by its loudness. */
   async hear(file) {
     const sound = { url: URL.createObjectURL(file), offset: 0 };
     if (this.player.clip && !this.player.audio) return this.player.listen(sound);
@@ -188,7 +188,7 @@ export class Viewer {
     if (this.turning) return;
     this.turning = true;
     const again = () => {
-      this.turning = this.canvas.isConnected; // an element may be taken off its page
+      this.turning = this.canvas.isConnected; // the element may be removed from its page
       if (!this.turning) return;
       requestAnimationFrame(again);
       this.player.step();
@@ -200,7 +200,7 @@ export class Viewer {
     again();
   }
 
-  /** For tests: a pose by numbers, as Python has it. */
+  /** For tests: a pose as numbers, as in Python. */
   evaluate(raw, lod) {
     this.instance.setLod(lod);
     this.instance.setRaw(raw);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How strongly each set of wrinkles shows at each place: one small picture, drawn anew when the maps of
-// a pose change. Red, green and blue are the sets, alpha is how far the skin is flushed.
+// Strength of each wrinkle set at each place: one small texture, redrawn when the maps of a pose
+// change. Red, green and blue are the sets, alpha is the flush.
 import {
   HalfFloatType, LinearFilter, Mesh, NoBlending, OrthographicCamera, PlaneGeometry, Scene, ShaderMaterial,
   Vector4, WebGLRenderTarget,
@@ -15,7 +15,7 @@ uniform float side;
 uniform vec4 maps[COUNT]; // column, row, channel, value
 void main() {
   vec4 sum = vec4(0.0);
-  vec2 inside = clamp(place, RIM, 1.0 - RIM); // no neighbour's tile at the edges
+  vec2 inside = clamp(place, RIM, 1.0 - RIM); // do not sample the neighbour's tile at the edges
   for (int i = 0; i < COUNT; ++i) {
     if (maps[i].w == 0.0) continue;
     float amount = maps[i].w * texture2D(masks, (inside + maps[i].xy) / side).r;
@@ -25,7 +25,7 @@ void main() {
 }`;
 
 export class Wrinkles {
-  /** In: what looks.py says of them, the picture of all masks. */
+  /** In: the wrinkle data of looks.py, the texture of all masks. */
   constructor({ maps, side }, masks) {
     this.indices = maps.map(([index]) => index);
     this.places = maps.map(([, tile, channel]) => new Vector4(tile % side, Math.floor(tile / side), channel, 0));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a face of the C API tells, against the Dna that the C++ reads of the same file.
+// Compares the contents of a face in the C API with the Dna that C++ reads from the same file.
 #include <algorithm>
 #include <cstddef>
 #include <string>
@@ -157,7 +157,7 @@ TEST(ApiFace, HasNoMeshThatWasNotAskedFor) {
   EXPECT_EQ(m.target_count, 0u);
 }
 
-// What a compiled program relies on.
+// A compiled program relies on these values.
 TEST(ApiFace, TheLibraryIsTheHeaders) {
   EXPECT_EQ(risorius_abi(), std::uint32_t{RISORIUS_ABI});
   EXPECT_STREQ(risorius_version(), RISORIUS_TEST_VERSION);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the C API refuses: bytes from anywhere, and the mistakes of a program.
+// The C API refuses malformed files and invalid calls of a program.
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -13,7 +13,8 @@ using namespace testing_support;
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Opened and evaluated at every LOD, or refused with a sentence and a place in the file.
+// The bytes are opened and evaluated at every LOD, or refused with a sentence and a place in the
+// file.
 void expect_sound(const Bytes& bytes) {
   risorius_options options{};
   options.flags = RISORIUS_GEOMETRY | RISORIUS_TARGETS;

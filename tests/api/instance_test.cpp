@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The poses of the C API are those of the C++ evaluator, bit by bit.
+// The poses of the C API have the same bits as those of the C++ evaluator.
 #include "rig/stages/instance.h"
 
 #include <cmath>
@@ -29,7 +29,7 @@ rig::Rig compile_golden(const std::string& name, const compile::CompileOptions& 
   return std::move(rig).value();
 }
 
-// Numbers between 0 and 1 that turn to others; every third control rests.
+// Numbers between 0 and 1 that change with `turn`; every third control rests.
 std::vector<float> wave(std::size_t count, std::size_t turn) {
   std::vector<float> out(count, 0.0f);
   for (std::size_t i = 0; i < count; ++i) {
@@ -122,7 +122,8 @@ TEST(ApiInstance, GuiControlsMoveTheRawControlsOfTheirTableAndNoOther) {
   const std::vector<float> before = wave(rig.raw_count, 1), gui = wave(rig.gui_count, 2);
   ASSERT_GT(gui.size(), 1u);
   set_raw(instance, before);
-  for (std::uint32_t i = 0; i < gui.size(); ++i) {  // one by one: the table sees them together
+  // Set one by one; the table still sees all of them.
+  for (std::uint32_t i = 0; i < gui.size(); ++i) {
     ASSERT_EQ(risorius_set(instance.get(), RISORIUS_GUI_CONTROLS, i, 1, &gui[i]), RISORIUS_OK);
   }
   std::vector<float> wanted(rig.raw_count);

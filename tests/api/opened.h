@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Faces and instances of the C API that are closed when a test ends.
+// Faces and instances of the C API that are closed at the end of a test.
 #pragma once
 
 #include <gtest/gtest.h>

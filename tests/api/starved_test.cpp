@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where the system has no memory the C API says so, and nothing is thrown or lost.
+// If memory runs out, the C API reports it; nothing is thrown or lost.
 #include <atomic>
 #include <cstdlib>
 #include <new>
@@ -8,7 +8,7 @@
 
 namespace {
 
-std::atomic<long> left{-1};  // how many calls of new succeed; -1: all
+std::atomic<long> left{-1};  // number of calls of new that succeed; -1: all
 
 void* given(std::size_t bytes) noexcept {
   if (left == 0) return nullptr;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A flat sheet over a ball, of which formulas say how deep it is inside.
+// A flat sheet over a ball; formulas give the depth of each vertex in the ball.
 #include "author/correct.h"
 
 #include <gtest/gtest.h>
@@ -61,7 +61,7 @@ struct Scene {
     skin.solids.push_back(sphere(ball));
   }
   SkinPose pose(const std::vector<Vector3>& positions) const { return {positions, {ball}}; }
-  /// The sheet pushed down by so much in the middle, softly.
+  /// The sheet pushed down softly in the middle, by `depth` mm.
   std::vector<Vector3> pushed(double depth, double reach = 9.0) const {
     auto out = skin.neutral;
     for (std::uint32_t v = 0; v < out.size(); ++v) {
@@ -119,8 +119,8 @@ TEST(Correct, StretchIsAreaAndAFoldIsACosine) {
   const SkinChecker check = checker(scene);
   auto positions = scene.skin.neutral;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
-    if (x_of(v) > 10.0) positions[v][0] += 2.0;   // the faces between are three times as wide
-    if (x_of(v) < -10.0) positions[v][0] += 2.0;  // those here lie on their neighbours
+    if (x_of(v) > 10.0) positions[v][0] += 2.0;   // the faces between become three times as wide
+    if (x_of(v) < -10.0) positions[v][0] += 2.0;  // the faces here lie on their neighbours
   }
   const auto rest = look(check, scene.pose(scene.skin.neutral));
   const auto found = look(check, scene.pose(positions));
@@ -153,21 +153,21 @@ TEST(Correct, WhatTwoPartsDoTogetherIsRepairedNearTheFaultAlone) {
     const auto& x = repair->displacement[v];
     const double length = std::hypot(x[0], x[1], x[2]);
     most = std::max(most, length);
-    // Where the ball is deeper than kDepth is within 3.2 mm of the middle.
+    // The ball is deeper than kDepth within 3.2 mm of the middle.
     if (std::hypot(x_of(v), y_of(v)) > 3.5 + SkinChecker::kAround) {
       EXPECT_EQ(length, 0.0) << v;
     }
     for (std::size_t k = 0; k < 3; ++k) mended[v][k] += x[k];
   }
   EXPECT_GT(most, 0.4);
-  EXPECT_LT(most, 0.9);  // of 1.7 together: the parts stay
+  EXPECT_LT(most, 0.9);  // of 1.7 together: most of both parts remains
   EXPECT_LE(std::ranges::max(look(check, scene.pose(mended)).depth), SkinChecker::kDepth + 1e-3f);
 }
 
 TEST(Correct, WhatDoesMostAtAVertexStays) {
   const Scene scene;
   const SkinChecker check = checker(scene);
-  // The narrow push does nothing beyond 7 mm, where the wide one does all there is.
+  // Beyond 7 mm only the wide push acts.
   const auto narrow = scene.pushed(0.95, 7.0), wide = scene.pushed(0.6, 14.0);
   auto both = narrow;
   for (std::size_t v = 0; v < both.size(); ++v) both[v][2] += wide[v][2];
@@ -183,7 +183,7 @@ TEST(Correct, WhatDoesMostAtAVertexStays) {
   }
 }
 
-/// The repair of a pose of which no part can be undone, beside the sheet at rest.
+/// The repair of a pose whose parts cannot be undone, compared with the sheet at rest.
 Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, scene.pose(scene.skin.neutral));
@@ -197,7 +197,7 @@ Repair pushed_out(const Scene& scene, const std::vector<Vector3>& positions) {
     }
     for (std::size_t k = 0; k < 3; ++k) mended[v][k] += x[k];
   }
-  // What is told of the repair is what the mended pose has.
+  // The sums of the repair agree with the mended pose.
   const auto sums = check.sum(look(check, scene.pose(mended)), allowed);
   EXPECT_NEAR(sums->volume, repair->after.volume, 1e-3);
   EXPECT_EQ(sums->stretched, repair->after.stretched);
@@ -217,7 +217,7 @@ TEST(Correct, WhatCannotBeUndoneIsPushedOutOfTheBall) {
 TEST(Correct, AStretchThatCannotBeUndoneIsEased) {
   const Scene scene;
   auto positions = scene.skin.neutral;
-  for (std::uint32_t v = 0; v < positions.size(); ++v) {  // apart from the middle to one side
+  for (std::uint32_t v = 0; v < positions.size(); ++v) {  // pulled from the middle to one side
     const double d = (x_of(v) * x_of(v) + y_of(v) * y_of(v)) / 81.0;
     if (x_of(v) > 0.5 && d < 1.0) positions[v][0] += 1.9 * (1.0 - d) * (1.0 - d);
   }
@@ -241,7 +241,7 @@ TEST(Correct, VerticesWithoutAFaultKeepNineTenthsOfTheirWays) {
   positions[kMiddle][2] += 2.8;
   const Repair repair = pushed_out(scene, positions);
   EXPECT_LT(repair.after.stretched, repair.before.stretched);
-  EXPECT_GT(repair.after.stretched, 0u);  // it holds where something is left, too
+  EXPECT_GT(repair.after.stretched, 0u);  // holds even if faults are left
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     const bool near = std::max(std::abs(x_of(v)), std::abs(y_of(v))) < 2.5;
     if (near || positions[v][2] > -0.01) continue;
@@ -260,7 +260,7 @@ TEST(Correct, WhatOnePartDoesByItselfIsNoFault) {
       std::ranges::all_of(repair->displacement, [](const Vector3& x) { return x == Vector3{}; }));
 }
 
-/// Two sheets as one skin, 1 mm apart. In: apart  they look away from each other, as a thin plate
+/// Two sheets as one skin, 1 mm apart. In: apart  they face away from each other, like a thin plate
 Scene sheets(bool apart) {
   Scene scene;
   const std::size_t count = scene.skin.neutral.size(), faces = scene.skin.corners.size();
@@ -285,10 +285,10 @@ TEST(Correct, TheSkinInItselfIsFoundWhereItTouchedNothingBefore) {
   const Scene scene = sheets(false);
   const SkinChecker check = checker(scene);
   const std::size_t count = scene.skin.neutral.size() / 2;
-  auto positions = scene.skin.neutral;  // the upper one goes down by 2, through the lower one
+  auto positions = scene.skin.neutral;  // the upper sheet moves down by 2 mm, through the lower one
   for (std::size_t v = count; v < positions.size(); ++v) positions[v][2] -= 2.0;
   const auto found = look(check, {positions, {}});
-  // Between sheets so near no light leaves but at their rim: what is shown there is found.
+  // Light reaches so narrow a gap only at the rim: faults are found where vertices are shown.
   double deepest = 0.0;
   std::size_t inside = 0;
   for (std::size_t v = count; v < positions.size(); ++v) {
@@ -306,7 +306,8 @@ TEST(Correct, WhatGoesIntoOneAnotherGoesBackByHalfEach) {
   const SkinChecker check = checker(scene);
   const auto allowed = look(check, {scene.skin.neutral, {}});
   const std::uint32_t count = kSheet * kSheet;
-  auto positions = scene.skin.neutral;  // at the rim, where light gets in, the upper one goes down
+  // At the rim, where light enters, the upper sheet moves down.
+  auto positions = scene.skin.neutral;
   for (std::uint32_t v = 0; v < count; ++v) {
     const double d = std::hypot(x_of(v) + 20.0, y_of(v)) / 6.0;
     if (d < 1.0) positions[count + v][2] -= 1.6 * (1.0 - d * d) * (1.0 - d * d);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Fits of joints to shapes whose joints are known.
+// Fits of joints to shapes that were made with known joints.
 #include "author/fit.h"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ double bump(const Vector3& p, double x, double y) {
   return d < 1.0 ? (1.0 - d) * (1.0 - d) : 0.0;
 }
 
-/// Both sides rise, each by an expression of its own; the left one turns about y in a third.
+/// Each side rises in an expression of its own; in a third the left side turns about y.
 Shapes two_sides() {
   Shapes out = sheet(3);
   const double angle = 0.3;
@@ -106,7 +106,7 @@ FitOptions few(std::size_t joints) {
 }
 
 TEST(Fit, MoreJointsComeNearer) {
-  const Shapes shapes = two_sides();  // its motions are up to 0.18 long
+  const Shapes shapes = two_sides();  // displacements are up to 0.18 long
   double before = 0.02;
   for (const std::size_t joints : {3u, 9u}) {
     auto fit = fit_joints(shapes, few(joints));
@@ -178,7 +178,7 @@ TEST(Fit, BothSidesOfASymmetricMeshAreAlike) {
   }
 }
 
-/// How far a joint alone moves a vertex in an expression, at most.
+/// The largest displacement by a joint alone in an expression.
 double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e) {
   Fit alone = fit;
   for (std::size_t other = 0; other < fit.joints.size(); ++other) {
@@ -193,7 +193,7 @@ double effect(const Shapes& shapes, const Fit& fit, std::size_t j, std::size_t e
   return most;
 }
 
-/// The same of the other side: joint and expression.
+/// The index of the same joint and expression on the other side.
 std::size_t other_side(const Mirror& mirror, const Fit& fit, std::size_t j, std::size_t e,
                        std::size_t expressions) {
   return fit.mirrored[j] * expressions + mirror.expressions[e];
@@ -223,7 +223,7 @@ TEST(Fit, JointsLeaveExpressionsInWhichTheyDoLittleAndOthersTakeOver) {
         cut.motions[at] = {};
         ++small;
       }
-      if (e < 2) {  // the third has no other side
+      if (e < 2) {  // the third expression has no counterpart
         const std::size_t other = other_side(mirror, *few_each, j, e, shapes.expressions);
         EXPECT_EQ(rests(few_each->motions[at]), rests(few_each->motions[other]));
       }
@@ -241,7 +241,7 @@ TEST(Fit, JointsLeaveExpressionsInWhichTheyDoLittleAndOthersTakeOver) {
 TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
   const Shapes shapes = two_sides();
   FitOptions options = few(6);
-  options.emphasis = 8.0;  // which leads some rounds astray
+  options.emphasis = 8.0;  // so large that some rounds become worse
   bool any = false;
   for (std::size_t rounds = 5; rounds < 15; ++rounds) {
     options.rounds = rounds;
@@ -250,7 +250,7 @@ TEST(Fit, WhatIsBoundIsTheBestOfItsRounds) {
     options.bound = true;
     auto best = fit_joints(shapes, options);
     ASSERT_TRUE(last && best);
-    // The fit looks at the mirror of the third expression as well.
+    // The fit also counts the mirror of the third expression.
     EXPECT_LE(largest_error(shapes, *best), 1.1 * largest_error(shapes, *last)) << rounds;
     any = any || largest_error(shapes, *best) < 0.9 * largest_error(shapes, *last);
   }
@@ -307,7 +307,7 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
     Shapes left = shapes;
     for (std::size_t v = 0; v < left.vertex_count(); ++v) {
       if (left.neutral[v][0] > 0.0) continue;
-      // What lies on the right is not looked at.
+      // The right side is not compared.
       for (std::size_t e = 0; e < left.expressions; ++e) {
         for (std::size_t k = 0; k < 3; ++k) at(left, v, e, k) = 0.0f;
       }
@@ -324,7 +324,7 @@ TEST(Fit, WhatIsMoreImportantComesNearer) {
 
 TEST(Fit, WhatIsImportantIsNotSmoothedAway) {
   Shapes shapes = sheet(1);
-  for (std::size_t y = 1; y < kSide; y += 2) {  // peaks among vertices that rest
+  for (std::size_t y = 1; y < kSide; y += 2) {  // peaks between resting vertices
     for (std::size_t x = 1; x < kSide; x += 2) at(shapes, y * kSide + x, 0, 2) = 0.1f;
   }
   const std::size_t peak = 11 * kSide + 11;
@@ -351,7 +351,7 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto fit = fit_joints(shapes, few(9));
   ASSERT_TRUE(fit);
   std::vector<GivenJoint> joints(fit->joints.size());
-  for (std::size_t j = 1; j < joints.size(); ++j) {  // the first rests
+  for (std::size_t j = 1; j < joints.size(); ++j) {  // the first joint rests
     joints[j].position = fit->joints[j];
     const auto first = fit->motions.begin() + static_cast<std::ptrdiff_t>(3 * j);
     joints[j].motions.assign(first, first + 3);
@@ -360,7 +360,7 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
   auto again = fit_weights(shapes, joints, few(9), start);
   ASSERT_TRUE(again) << again.error().describe();
   EXPECT_LT(largest_error(shapes, *again), 1.1 * largest_error(shapes, *fit));
-  // Joints that rest, more of them than joints that a vertex tries, keep none from those that move.
+  // Resting joints, even more of them than candidates of a vertex, displace no moving joint.
   std::vector<GivenJoint> many(30);
   many.insert(many.end(), joints.begin() + 1, joints.end());
   StartWeights later = start;
@@ -382,7 +382,7 @@ TEST(Fit, WeightsGoOnFromThoseOfTheFinerMesh) {
             core::ErrorCode::kInvalidLength);
 }
 
-/// A sheet like another one, half as wide and twice as deep, and so is what it does.
+/// A sheet half as wide and twice as deep, with displacements scaled alike.
 Shapes reshaped(Shapes shapes) {
   for (Vector3& p : shapes.neutral) p = {0.5 * p[0], p[1], 2.0 * p[2] + 0.1 * p[1]};
   for (std::size_t i = 0; i < shapes.displacements.size(); i += 3) {
@@ -400,7 +400,7 @@ TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
   ASSERT_TRUE(fit) << fit.error().describe();
   const StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
   const std::vector<std::uint32_t> middles(8, kInTheMiddle);
-  // On the same sheet what was found is found again, and the weights stay.
+  // On the same sheet the fit finds the same motions, and the weights stay.
   auto same = fit_motions(shapes, options, weights, middles);
   ASSERT_TRUE(same) << same.error().describe();
   EXPECT_LT(largest_error(shapes, *same), 1.2 * largest_error(shapes, *fit));
@@ -410,10 +410,10 @@ TEST(Fit, AnotherFaceOfTheTopologyTakesJointsAndWeightsOver) {
   }
   auto there = fit_motions(other, options, weights, middles);
   ASSERT_TRUE(there) << there.error().describe();
-  auto own = fit_joints(other, options);  // joints and weights that are made for it
+  auto own = fit_joints(other, options);  // joints and weights fitted to this sheet
   ASSERT_TRUE(own);
   EXPECT_LT(largest_error(other, *there), 3.0 * largest_error(other, *own));
-  for (std::size_t j = 1; j < 9; ++j) {  // in the middle of the squares of what each moves
+  for (std::size_t j = 1; j < 9; ++j) {  // in the mean of the vertices, weighted by squared motion
     Vector3 sum{};
     double total = 0.0;
     for (std::size_t v = 0; v < other.vertex_count(); ++v) {
@@ -454,12 +454,12 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
   ASSERT_TRUE(fit);
   StartWeights weights{fit->influences, fit->weight_joints, fit->weights};
   std::vector<std::uint32_t> at(8, kInTheMiddle);
-  at[2] = 1;  // there is no pivot
+  at[2] = 1;  // a pivot that does not exist
   auto refused = fit_motions(shapes, options, weights, at);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
   EXPECT_EQ(refused.error().where, "at[2]");
-  at.pop_back();  // one joint less than there are
+  at.pop_back();  // one joint too few
   at[2] = kInTheMiddle;
   refused = fit_motions(shapes, options, weights, at);
   ASSERT_FALSE(refused);
@@ -471,7 +471,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
   options.given[0].motions.resize(3);
-  options.given[0].motions[1].translation = {0.0, 0.0, 0.1};  // none rests
+  options.given[0].motions[1].translation = {0.0, 0.0, 0.1};  // no joint rests
   weights.joints[7] = 0;
   refused = fit_motions(shapes, options, weights, at);
   ASSERT_FALSE(refused);
@@ -480,7 +480,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
 
 TEST(Fit, JointsOfBothSidesAtOnePlaceAreToldApart) {
   const Shapes shapes = two_sides();
-  // Two joints of each side turn about one point, each in an expression of its own.
+  // Two joints of each side turn about one point, each in its own expression.
   std::vector<GivenJoint> joints(5);
   for (std::size_t j = 1; j < 5; ++j) {
     joints[j].position = {j % 2 == 1 ? 0.5 : -0.5, 0.0, -0.4};
@@ -512,7 +512,7 @@ TEST(Fit, JointsOfALidLieInTheEye) {
   EXPECT_GT(at_pivot(0.5), 0);
   EXPECT_EQ(at_pivot(0.5), at_pivot(-0.5));
   EXPECT_LT(largest_error(shapes, *fit), 0.02);
-  // Eyes that are not quite alike: the joints of both sides are, half way between.
+  // The eyes are slightly asymmetric: the joints of both sides are placed half way.
   options.pivots[1].position[0] = -0.48;
   fit = fit_joints(shapes, options);
   ASSERT_TRUE(fit) << fit.error().describe();

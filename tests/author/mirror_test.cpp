@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Meshes whose other side is known.
+// Meshes with a known mirror.
 #include "author/mirror.h"
 
 #include <gtest/gtest.h>
@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::uint32_t kNone = Mirror::kNone;
 
-/// Two triangles that share the vertices 0 and 2 of the middle, not in the order of their heights;
-/// 1 lies on the left, 3 on the right.
+/// Two triangles that share the middle vertices 0 and 2, whose heights are not in that order.
+/// Vertex 1 lies on the left, 3 on the right.
 Shapes kite(std::size_t expressions) {
   Shapes out;
   out.neutral = {{0, 2, 0}, {1, 1, 0.5}, {0, 0, 0}, {-1, 1, 0.5}};
@@ -33,7 +33,7 @@ TEST(Mirror, KnowsTheVertexOfTheOtherSide) {
 TEST(Mirror, OutwardOnOneSideIsOutwardOnTheOther) {
   Shapes shapes = kite(4);
   move(shapes, 1, 0, {0.2, 0.1, 0});   // the left one outward and up
-  move(shapes, 3, 1, {0.2, 0.1, 0});   // the right one inward and up: of no other side
+  move(shapes, 3, 1, {0.2, 0.1, 0});   // the right one inward and up: without a counterpart
   move(shapes, 3, 2, {-0.2, 0.1, 0});  // the right one outward and up
   move(shapes, 0, 3, {0, 0.3, 0.1});   // in the middle
   EXPECT_EQ(find_mirror(shapes).expressions, (std::vector<std::uint32_t>{2, kNone, 0, 3}));
@@ -47,7 +47,7 @@ TEST(Mirror, ThereIsNoneWhereAVertexHasNoOtherSide) {
 
 TEST(Mirror, ThereIsNoneWhereTwoVerticesHaveTheSameOtherSide) {
   Shapes shapes = kite(0);
-  shapes.neutral.push_back({1, 1.0001, 0.5});  // as near as 1 to the other side of 3
+  shapes.neutral.push_back({1, 1.0001, 0.5});  // as near to the mirrored vertex 3 as vertex 1 is
   shapes.edges.push_back({0, 4});
   shapes.edges.push_back({4, 2});
   EXPECT_TRUE(find_mirror(shapes).empty());

@@ -55,7 +55,7 @@ TEST(Simplify, WhatAnAttributeShowsIsKept) {
   Surface surface = square();
   surface.attribute_count = 1;
   for (std::uint32_t c = 0; c < surface.positions.size(); ++c) {
-    // A hill in one corner of the sheet, which the positions do not show.
+    // An attribute that peaks in one corner of the sheet and is invisible in the positions.
     const float x = surface.positions[c][0], y = surface.positions[c][1];
     surface.attributes.push_back(std::max(0.0f, 0.5f - x) * std::max(0.0f, 0.5f - y) * 4.0f);
   }
@@ -68,7 +68,7 @@ TEST(Simplify, WhatAnAttributeShowsIsKept) {
     };
     hill += std::all_of(t.begin(), t.end(), low) ? 1 : 0;
   }
-  EXPECT_GT(2 * hill, some->triangles.size());  // of a quarter of the area
+  EXPECT_GT(2 * hill, some->triangles.size());  // on a quarter of the area
 }
 
 TEST(Simplify, EnoughTrianglesChangeNothing) {

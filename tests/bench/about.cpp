@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Alone in a file, since a new commit compiles it anew.
+// A file of its own, because every commit recompiles it.
 #include "bench/machine.h"
 
 namespace risorius::bench {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Opening a compiled face from its file against compiling it: cache_bench FILE.dna
+// Compares opening a compiled face with compiling it: cache_bench FILE.dna
 #include <benchmark/benchmark.h>
 
 #include <cstdio>

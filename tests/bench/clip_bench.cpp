@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Clips in .rzc files: clip_bench FILE.rzc ... [--dna FILE.dna] [options of the library]
+// Measures clips in .rzc files: clip_bench FILE.rzc ... [--dna FILE.dna] [options of the library]
 //   encode, decode     GB/s of curve data, one core, from memory to memory
-//   one frame          any frame of all controls, its block read and decoded for it alone
-//   play               frame after frame, each block read and decoded when it is reached; per frame
-//   play, decoded      the same within a block that is decoded already
-//   evaluate           the rig of --dna on such frames, per frame: what play is to be compared with
+//   one frame          any frame of all controls; its block is read and decoded for it alone
+//   play               frame by frame; each block is read and decoded when it is reached; per frame
+//   play, decoded      the same within a decoded block
+//   evaluate           the rig of --dna on these frames, per frame, for comparison with play
 #include <benchmark/benchmark.h>
 
 #include <cstdio>
@@ -64,7 +64,7 @@ void decode(benchmark::State& state, const File& file) {
 
 void one_frame(benchmark::State& state, const File& file) {
   clip::Player player(open(file));
-  // Far from the frame before: another block, but in a clip of one.
+  // Far from the frame before, so that it lies in another block unless the clip has only one.
   std::size_t at = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(player.frame(at));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the benchmark library does not measure by itself.
+// Clocks that the benchmark library lacks.
 #pragma once
 
 #include <benchmark/benchmark.h>
@@ -19,7 +19,8 @@ double wall_seconds_of(F f) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The time in which this process had a core: what others take of a busy machine is not in it.
+/// The time in which this process had a core, without the time of other processes on a busy
+/// machine.
 template <class F>
 double own_seconds_of(F f) {
 #ifdef CLOCK_PROCESS_CPUTIME_ID

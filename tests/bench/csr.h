@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the evaluator is compared with: a whole evaluation by the shortest scalar code, joints as a
+// The rival of the evaluator: a whole evaluation in the shortest scalar code, with joints as a
 // plain compressed sparse row matrix.
 #pragma once
 
@@ -10,7 +10,7 @@
 
 namespace risorius::bench {
 
-/// The matrix of all joint groups, a row per joint attribute.
+/// The matrix of all joint groups, one row per joint attribute.
 struct Csr {
   std::vector<std::uint32_t> begins;  // [rows + 1]
   std::vector<std::uint16_t> columns;

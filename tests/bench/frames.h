@@ -15,12 +15,12 @@ namespace risorius::bench {
 struct Frames {
   std::size_t count = 0, controls = 0;
   std::vector<float> values;  // [count, controls]
-  std::string name;           // as the table has it
+  std::string name;           // as in the table
   const float* at(std::size_t frame) const { return values.data() + frame * controls; }
 };
 
-/// As a face moves: a part of the controls is active, each frame has other values, and every second
-/// frame another control takes one's place.
+/// Frames like a moving face: a part of the controls is active, every frame has new values, and in
+/// every second frame another control replaces an active one.
 inline Frames make_frames(std::size_t controls, std::size_t active) {
   constexpr std::size_t kCount = 1024;
   std::mt19937 random(7);
@@ -38,7 +38,7 @@ inline Frames make_frames(std::size_t controls, std::size_t active) {
   return frames;
 }
 
-/// Little-endian float32[count, controls]; no frames where the file is not that.
+/// Little-endian float32[count, controls]; no frames if the file has another size.
 inline Frames read_frames(const char* path, std::size_t controls) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a processor can issue, whatever the memory is like.
+// Measures how much a processor can issue if memory is no limit.
 #pragma once
 
 #include <cstddef>
@@ -7,9 +7,9 @@
 
 namespace risorius::bench {
 
-/// As many reads and multiply-adds as `Kernels::skin` of an instruction set needs for so many
-/// influences, on what the first cache holds: of each a row of the matrix, of four at once the
-/// bones and the weights. What a vertex needs besides is left out.
+/// Issues the reads and multiply-adds that `Kernels::skin` of an instruction set needs for this
+/// number of influences, on data in the first cache: for each influence a row of the matrix, for
+/// each four the bones and the weights. Other work per vertex is left out.
 void issue_skin(std::string_view set, std::size_t influences);
 
 }  // namespace risorius::bench

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a benchmark ran on.
+// The machine and the build of a benchmark.
 #pragma once
 
 #include <fstream>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How long a frame of a mixer takes:  mixer_bench [Google Benchmark's options]
-// 260 controls, clips of ten minutes at 60 frames a second, times that lie between frames.
+// Measures one frame of a mixer: mixer_bench [Google Benchmark's options]. 260 controls, clips of
+// ten minutes at 60 frames per second, times between frames.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -19,7 +19,7 @@ std::vector<std::string> control_names() {
   return out;
 }
 
-// A clip whose curves move at every `step`-th control, rest above 0 at every other one of these.
+// A clip in which every `step`-th region moves.
 clip::Layer make_layer(std::size_t step, clip::Blend blend, unsigned seed) {
   const std::vector<std::string> names = control_names();
   std::mt19937 random(seed);

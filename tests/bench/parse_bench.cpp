@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How long reading a file takes:  parse_bench FILE.dna [Google Benchmark's options]
-// "plain" is what any reader has to do: the whole file into fresh memory, every word swapped.
-// Memory goes back to the system before each run, so that every run pays for its pages.
+// Measures reading a file: parse_bench FILE.dna [Google Benchmark's options]. "plain" is the least
+// work of any reader: the whole file into fresh memory, with every word swapped. Memory is returned
+// to the system before each run, so that every run pays for its pages.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -44,7 +44,7 @@ class CountingSource final : public bytes::Source {
   std::uint64_t bytes_ = 0;
 };
 
-// What a run is measured against the others by. Bytes are those of one run of its own.
+// The results of a run. Bytes come from a separate run.
 struct Row {
   std::string name;
   std::vector<double> ms;
@@ -52,7 +52,7 @@ struct Row {
   std::uint64_t bytes_read = 0, bytes_kept = 0;
 };
 
-// An error here is the caller's mistake: main() has read the file once.
+// An error here is a mistake of the caller, because main() has read the file once.
 template <class T>
 T must(core::Result<T> result) {
   if (!result) {
@@ -107,7 +107,7 @@ double ms_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
 }
 
-// load() gives what is to be freed; that happens after the clock was read.
+// load() returns the objects to free, which happens after the time is taken.
 template <class Load>
 void measure_load(benchmark::State& state, Row& row, const Load& load) {
   for (auto _ : state) {
@@ -180,7 +180,7 @@ class Bench {
     rows_.back()->name = name;
     return *rows_.back();
   }
-  // A run that Google Benchmark's filter leaves out has no times and is not printed.
+  // A run that Google Benchmark's filter excludes has no times and is not printed.
   template <class Run>
   void run(Row& row, Run measure) {
     benchmark::RegisterBenchmark(row.name.c_str(), measure)
@@ -230,7 +230,7 @@ void Bench::print() {
 }
 
 void add_partial_loads(Bench& bench, std::uint16_t lod_count) {
-  dna::ParseOptions only;  // the definition and nothing else
+  dna::ParseOptions only;  // only the definition
   only.behavior = only.geometry = only.machine_learned_behavior = only.rbf_behavior = false;
   only.joint_behavior_metadata = only.twist_swing_behavior = only.unknown_layers = false;
   dna::ParseOptions behavior = only, geometry = only, descriptor = only;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The evaluator against a scalar CSR matrix:
+// Compares the evaluator with a scalar CSR matrix:
 //   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [--progress]
 //   [--clip FRAMES.f32] [options of the library]
-// Frames are little-endian float32[frames, raw controls]; without files their like is made.
-// --sweep measures how cost grows instead, and prints a row per point: what, x, us, us
-//   of csr, us of the tight read.
+// Frames are little-endian float32[frames, raw controls]; without files similar frames are made.
+// --sweep measures how the cost grows instead, and prints a row for each point: name, x, us, us of
+// csr, us of the tight read.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -36,8 +36,8 @@ namespace {
 using namespace risorius;
 using bench::Frames;
 
-// A row of the table: what it is measured against, the tight read of its own active columns and
-// what was asked of it. With a read: at most kReads times it and kBeside us.
+// A row of the table: its base, the tight read of its active columns, and its target. With a read
+// the target is at most kReads times the read and kBeside us.
 struct Line {
   std::string name, base, read, asked;
   double bytes = 0;  // of the active columns
@@ -79,7 +79,7 @@ Step csr(const dna::Dna& dna, std::uint32_t lod) {
   return [base](const float* raw) { base->evaluate(raw); };
 }
 
-// Never the same frame twice in a row.
+// No frame is evaluated twice in a row.
 void add(const std::string& name, Step step, const Frames& frames) {
   benchmark::RegisterBenchmark(name.c_str(), [&frames, step](benchmark::State& state) {
     std::size_t f = 0;
@@ -102,9 +102,9 @@ void add_cold(const std::string& name, Step step, const Frames& frames) {
   b->UseManualTime()->Iterations(1)->Repetitions(61);
 }
 
-// Many frames or faces at once, in as many threads: several by the clock on the wall and in rounds,
-// since to begin a thread on an idle core of a virtual machine takes as long as hundreds of frames;
-// one by its own clock, which does not run while others have the core.
+// Many frames or faces at once in several threads. Several threads are measured by wall time and in
+// rounds, because starting a thread on an idle core of a virtual machine takes as long as hundreds
+// of frames. One thread is measured by its own clock, which stops while others have the core.
 void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                std::size_t count, std::size_t threads, std::size_t rounds = 1) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=, &frames](benchmark::State& state) {
@@ -141,7 +141,7 @@ void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, con
   b->UseManualTime()->Iterations(static_cast<benchmark::IterationCount>(2000 / count + 2));
 }
 
-// The least that an evaluation of these frames has to do. Out: the mean of the bytes.
+// The least work of an evaluation of these frames. Out: the mean number of bytes
 double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                 std::uint32_t lod) {
   auto reads = std::make_shared<bench::Reads>(bench::reads_of(*rig, frames, lod));
@@ -156,7 +156,7 @@ double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, co
   return bytes;
 }
 
-// The poses of a clip, written past the caches: the time of one.
+// The time of storing one pose of a clip past the caches.
 void add_store(const std::string& name, std::shared_ptr<const rig::Rig> rig, std::size_t count) {
   auto* b = benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
     const std::size_t pose = std::size_t{rig->joint_count} * rig->joint_stride +
@@ -236,14 +236,14 @@ class Suite {
   }
 
  private:
-  // A row of the table. Out: its name
+  // Adds a row of the table. Out: its name
   const std::string& row(const std::string& name, const std::string& base = "",
                          const std::string& asked = "", const std::string& read = "",
                          double bytes = 0) {
     lines_.push_back({name, base, read, asked, bytes});
     return lines_.back().name;
   }
-  // The face, the sparse matrix and the read of its own columns.
+  // Adds the face, the sparse matrix and the tight read of its columns.
   void add_ours(const std::string& what, const std::shared_ptr<rig::Rig>& rig, const Frames& frames,
                 std::uint32_t lod, const std::string& asked, const std::string& level = "") {
     const std::string base = "csr" + level + ", " + frames.name;
@@ -321,7 +321,7 @@ class Suite {
   std::deque<Line> lines_;
 };
 
-// How cost grows: each point as "what/x" beside "csr what/x".
+// Measures how cost grows: each point as "name/x" beside "csr name/x".
 class Sweep {
  public:
   Sweep(const dna::Dna& dna, const Frames& frames) : dna_(dna), frames_(frames) {
@@ -373,7 +373,7 @@ class Sweep {
     pair("active controls", n, one_face(rig_, 0), csr(dna_, 0), *made_.back());
     add_read("read active controls/" + std::to_string(n), rig_, *made_.back(), 0);
   }
-  // The same face with some of its joint groups only.
+  // The same face with some of its joint groups.
   void add_groups(std::size_t n) {
     smaller_.push_back(std::make_unique<dna::Dna>(dna_));
     auto& groups = smaller_.back()->behavior.joint_groups;
@@ -392,7 +392,7 @@ class Sweep {
   std::vector<std::unique_ptr<dna::Dna>> smaller_;
 };
 
-// Keeps the medians. In: progress  on one line of a terminal what runs
+// Keeps the medians. In: progress  show the running benchmark on one line of the terminal
 class Reporter : public benchmark::ConsoleReporter {
  public:
   explicit Reporter(bool progress) : progress_(progress) {}
@@ -423,7 +423,7 @@ core::Result<dna::Dna> read(const char* path) {
   return dna::parse(**source);
 }
 
-// What a face lacks for a table of evaluations, or nullptr.
+// The part that a face lacks for a table of evaluations, or nullptr.
 const char* missing_part(const dna::Dna& dna) {
   if (dna.definition.raw_control_names.empty()) return "raw controls";
   if (dna.descriptor.lod_count == 0) return "LODs";
@@ -432,7 +432,7 @@ const char* missing_part(const dna::Dna& dna) {
   return std::ranges::any_of(dna.behavior.joint_groups, has_values) ? nullptr : "joint groups";
 }
 
-// One set of frames, read from a file or made. Out: false, having said so, where the file is none.
+// One set of frames, from a file or made. Out: false, after a message, if the file is not valid
 bool add_frames(const std::string& name, std::size_t raw, std::size_t active, const char* file,
                 std::vector<Frames>& out) {
   Frames frames = file != nullptr ? bench::read_frames(file, raw) : bench::make_frames(raw, active);
@@ -445,13 +445,13 @@ bool add_frames(const std::string& name, std::size_t raw, std::size_t active, co
   return true;
 }
 
-// The sets of frames that the table goes through.
+// The sets of frames of the table.
 // In: files  of 20, of 60 and of all controls, or nullptr
 //     clip   frames of a real clip, or nullptr
 bool list_frames(std::size_t raw, char** files, const char* clip, std::vector<Frames>& out) {
   // Captures move 60 to 100 raw controls, so these rows come first.
   for (const std::size_t active : {60u, 100u, 20u, 1u, 5u, 140u, 190u}) {
-    // The rows that others are compared with are there for small faces too.
+    // The base rows are measured for small faces too.
     if (active >= raw && active != 20 && active != 60) continue;
     const char* file = files == nullptr ? nullptr
                        : active == 20   ? files[0]

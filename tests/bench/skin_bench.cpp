@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// The skinning kernel of each instruction set beside the least that it has to do:
-//   skin_bench
-// 24,000 vertices of 12 influences, 870 bones: chosen at random for each influence, or near each
-// other as on a face. (a) reads and writes its bytes once; (b) issues its loads and multiply-adds
-// on what the first cache holds.
+// Compares the skinning kernel of each instruction set with two lower bounds: skin_bench. 24,000
+// vertices with 12 influences, 870 bones: random bones for each influence, or bones near each other
+// as on a face. Bound (a) reads and writes its bytes once; (b) issues its loads and multiply-adds
+// on data in the first cache.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -27,12 +26,12 @@ struct Times {
   double median = 0, least = 0;  // us
 };
 
-// Interleaved, so that what else the machine does meets all of them.
+// Interleaved, so that other load of the machine affects all steps alike.
 std::vector<Times> measure(const std::vector<std::function<void()>>& steps, std::size_t rounds) {
   std::vector<std::vector<double>> all(steps.size());
   for (std::size_t r = 0; r < rounds; ++r) {
     for (std::size_t s = 0; s < steps.size(); ++s) {
-      steps[s]();  // what the others left in the caches is not its own
+      steps[s]();  // replaces the caches' content from other steps
       all[s].push_back(1e6 * bench::wall_seconds_of(steps[s]));
     }
   }
@@ -50,7 +49,7 @@ struct Problem {
   core::AlignedVector<float> rows;
 };
 
-// In: spread  how far from each other the bones of a vertex are; kBones: anywhere
+// In: spread  range of the bones of a vertex; kBones: any bone
 Problem make_problem(std::uint32_t spread) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> any(0.01f, 1.0f);
@@ -80,7 +79,7 @@ void read_whole(const void* memory, std::size_t bytes) {
   benchmark::DoNotOptimize(bench::tight_read(memory, {&lines, 1}));
 }
 
-// Behind the address of what is read by whole lines.
+// The first whole cache line in `values`.
 template <class T>
 const void* on_a_line(const std::vector<T>& values) {
   const auto address = reinterpret_cast<std::uintptr_t>(values.data());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The least that an evaluation has to do: to read the columns of the controls that are active.
+// The least work of an evaluation: reading the columns of the active controls.
 #pragma once
 
 #include <cstddef>
@@ -12,27 +12,26 @@
 
 namespace risorius::bench {
 
-/// Whole cache lines one after the other, counted from the begin of a matrix.
+/// Consecutive cache lines, counted from the begin of a matrix.
 struct Lines {
   std::uint32_t first = 0, count = 0;
 };
 
-/// Reads lines by the widest registers of this CPU into eight sums, so that no read waits for
-/// another.
+/// Reads lines with the widest registers of this CPU into eight independent sums.
 /// In:  memory  begins on a cache line
-/// Out: a number that depends on each of them
+/// Out: a number that depends on every line
 std::uint64_t tight_read(const void* memory, std::span<const Lines> lines);
 
-/// Fills memory by stores that go past the caches, where this CPU has them.
+/// Fills memory with stores that bypass the caches, if this CPU has them.
 /// In: memory  begins on a cache line
-///     bytes   of whole lines
+///     bytes   a whole number of lines
 void streaming_store(void* memory, std::size_t bytes);
 
-/// What the frames of one set need of a Rig's matrices.
+/// The lines of a Rig's matrices that the frames of one set need.
 struct Reads {
   std::vector<Lines> lines;         // of all frames
-  std::vector<std::size_t> begins;  // [frames + 1]: where a frame's lines begin
-  double bytes = 0;                 // of the active columns' values, the mean of all frames
+  std::vector<std::size_t> begins;  // [frames + 1]: the first line of each frame
+  double bytes = 0;                 // of the active columns' values, mean of all frames
   std::span<const Lines> at(std::size_t frame) const {
     return std::span(lines).subspan(begins[frame], begins[frame + 1] - begins[frame]);
   }

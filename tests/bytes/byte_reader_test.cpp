@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The checked reader: the same from memory and through the window of a file, at every place where a
-// number may be cut, and after a failure nothing but zeros.
+// The checked reader gives the same from memory and through the window of a file, even if the
+// window cuts a number, and only zeros after a failure.
 #include "bytes/byte_reader.h"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,8 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// As a file: pieces only. It may end earlier than it said, as one that is cut meanwhile.
+// Like a file: gives only pieces. It may end earlier than its size, like a file that is cut
+// meanwhile.
 class Pieces final : public Source {
  public:
   explicit Pieces(Bytes bytes, std::size_t missing = 0)
@@ -37,7 +38,7 @@ class Pieces final : public Source {
   Bytes bytes_;
 };
 
-// Every test once from memory and once in pieces.
+// Every test runs once from memory and once in pieces.
 class ByteReaderOf : public testing::TestWithParam<bool> {
  protected:
   ByteReader& open(Bytes bytes) {
@@ -84,7 +85,7 @@ TEST_P(ByteReaderOf, NumbersTextsAndListsComeBack) {
   EXPECT_EQ(reader.left(), 0u);
 }
 
-// Lists of more than a window, begun at every place within a number and within a vector of AVX2.
+// Lists longer than a window, at every offset within a number and within a vector of AVX2.
 TEST_P(ByteReaderOf, LongListsAreTheSameHoweverTheyLie) {
   for (std::size_t before = 0; before < 33; ++before) {
     for (const std::size_t n : {0u, 1u, 7u, 8u, 9u, 127u, 20000u}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Numbers as the format spells them: the most significant byte first.
+// Numbers are written with the most significant byte first.
 #include "bytes/byte_writer.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whole files and pieces of them, and what is no file.
+// Whole files, parts of files, and paths that are not files.
 #include "bytes/file_read.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files that are whole or as they were, whatever call of the system fails.
+// A file is complete or unchanged, whichever system call fails.
 #include "bytes/file_write.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ using testing_support::read_file;
 using Bytes = std::vector<std::uint8_t>;
 namespace fs = std::filesystem;
 
-// What was asked of the system, one letter a call; the call `failing` fails with `reason`.
+// The system calls so far, one letter each; the call `failing` fails with `reason`.
 std::string asked;
 char failing = 0;
 int reason = 0;
@@ -123,7 +123,7 @@ TEST_F(FileWrite, OfNoFileFromBeforeAndOfAFolderThatIsNotThereItSaysSo) {
   EXPECT_EQ(folder.error().message, "cannot write " + folder_.string() + ": Is a directory");
 }
 
-// Windows gives the same reason for a file in place of the folder as for no folder.
+// Windows gives the same reason for a missing folder and for a file in its place.
 TEST_F(FileWrite, AFileInPlaceOfTheFolderIsToldFromNoFolderWhateverTheSystemSays) {
   std::ofstream(folder_ / "file") << "x";
   failing = 'o', reason = ENOENT;
@@ -168,7 +168,7 @@ TEST_F(FileWrite, WhatADeadWriterLeftGoesAndWhatALiveOneWritesStays) {
   const auto live = NewFile::beside(folder_ / "live", error);
   ASSERT_TRUE(live.has_value());
   const pid_t child = ::fork();
-  if (child == 0) {  // dies while it writes, as by kill -9
+  if (child == 0) {  // dies during a write, as by kill -9
     std::error_code why;
     auto file = NewFile::beside(folder_ / "dead", why);
     ::_exit(file ? 0 : 1);
@@ -179,7 +179,8 @@ TEST_F(FileWrite, WhatADeadWriterLeftGoesAndWhatALiveOneWritesStays) {
   std::vector<std::string> left = hidden_files(folder_);
   ASSERT_EQ(left.size(), 2u);
   std::erase(left, live->path().filename().string());
-  std::string foreign = left.at(0);  // of a machine of another name, where that process may live
+  // Of a machine with another name, where that process may be alive.
+  std::string foreign = left.at(0);
   foreign[std::string(".risorius-").size()] ^= 1;
   std::ofstream(folder_ / foreign) << "half";
   ASSERT_TRUE(write_file_atomically(folder_ / "a", new_).has_value());
@@ -219,7 +220,7 @@ TEST_F(FileWrite, AFileOfAnotherWriterTakesItsPlaceWholeOrStaysWhereItIs) {
   EXPECT_TRUE(make_hidden_folder(folder_ / "none" / "a", error).empty());
   EXPECT_EQ(error, std::errc::no_such_file_or_directory);
   remove_leftovers(folder_);
-  EXPECT_TRUE(fs::exists(hidden));  // this process lives
+  EXPECT_TRUE(fs::exists(hidden));  // this process is alive
 }
 
 TEST_F(FileWrite, LinksAreFollowedAlsoToWhereNothingIsYet) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whole files: back as they were, in parts, cut, damaged.
+// Whole .rzc files: lossless, in parts, cut, damaged.
 #include <gtest/gtest.h>
 
 #include <numeric>
@@ -126,7 +126,7 @@ TEST(ClipFile, PairsOfMetadataAreLimited) {
   EXPECT_EQ(read.error().where, "head.metadata");
 }
 
-// Each name repeats the one before and adds a letter: 3 bytes in the file.
+// Each name repeats the one before and adds a letter: 3 bytes of the file.
 TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   Clip clip;
   std::string name;
@@ -141,7 +141,7 @@ TEST(ClipFile, NamesThatGrowOutOfFewBytesAreLimited) {
   EXPECT_EQ(read.error().where, "head.names");
 }
 
-// The encoder writes what encode does, in pieces of any size.
+// The encoder gives the same bytes as encode() for pieces of any size.
 TEST(ClipEncoder, TakesFramesAsTheyCome) {
   Clip clip = make_full_clip(250);
   clip.events.clear();
@@ -226,7 +226,7 @@ TEST(ClipFile, EveryDamagedByteIsNoticed) {
   }
 }
 
-// As by somebody who knows how checksums are made.
+// Damage by an attacker who corrects the checksums.
 TEST(ClipFile, DamageUnderAGoodChecksumDoesNoHarm) {
   const Bytes bytes = must_encode(make_full_clip(40), 30);
   Bytes same = bytes;

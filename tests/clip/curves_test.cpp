@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The curves of a block: every bit back, and how little space they take.
+// The curves of a block are lossless and small.
 #include <gtest/gtest.h>
 
 #include <cfenv>
@@ -75,7 +75,7 @@ TEST(ClipCurves, RandomBitsDoNotGrow) {
   }
 }
 
-// A polynomial of degree 4 leaves its rounding only, whatever its size.
+// A polynomial of degree 4 leaves only its rounding, whatever its scale.
 TEST(ClipCurves, SmoothOnesAreContinued) {
   const Clip clip = make_all_kinds(512);
   Clip smooth = make_clip(1, 512);
@@ -100,7 +100,8 @@ TEST(ClipCurves, OfAnotherLengthAreRefused) {
   Clip smooth = make_clip(1, 64);
   std::copy_n(clip.curve(3).begin(), 64, smooth.curves.data());
   const Bytes bytes = encoded(smooth);
-  const std::uint32_t first = 0;  // one frame more or less may lie in the bits that fill a byte
+  // The bits that pad the last byte cannot tell one frame more or less.
+  const std::uint32_t first = 0;
   for (const std::size_t frames : {1u, 32u, 64u, 200u}) {
     const auto curves = EncodedCurves::open(bytes, 1, frames);
     ASSERT_TRUE(curves.has_value());

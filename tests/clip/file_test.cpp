@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A clip that is recorded into a file.
+// Recording a clip into a file.
 #include <gtest/gtest.h>
 
 #include <cerrno>
@@ -84,7 +84,7 @@ TEST_F(ClipRecording, WithoutAFolderIsRefused) {
   EXPECT_NE(folder.error().message.find("Is a directory"), std::string::npos);
 }
 
-// What was asked of the system when the recording was closed; the call `failing` fails.
+// The system calls during close(); the call `failing` fails.
 std::string asked;
 char failing = 0;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The checksum and the codes, against what is known of them.
+// The checksum and the prefix codes, compared with known values.
 #include "core/hash.h"
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a clip's reader and writer take from the heap.
+// Heap memory of a clip's reader and writer.
 #include <gtest/gtest.h>
 
 #include "clip/file/encoder.h"
@@ -12,7 +12,7 @@ namespace {
 
 using namespace testing_support;
 
-// What lies in a clip: values, times, names and events.
+// The size of a clip's content: values, times, names and events.
 std::size_t size_of(const Clip& clip) {
   std::size_t size = 4 * clip.curves.size() + 8 * clip.times.size();
   for (const std::string& name : clip.head.names) size += name.size();
@@ -20,7 +20,7 @@ std::size_t size_of(const Clip& clip) {
   return size;
 }
 
-// The factors stand in native/README.md. Beside: of a writer the frames of a block.
+// native/README.md documents the factors. In addition: the frames of a writer's block.
 constexpr std::size_t kTimesTheClip = 4, kTimesTheFile = 16, kBeside = 64 * 1024;
 
 TEST(ClipMemory, OfWritingGrowsWithTheClip) {
@@ -43,8 +43,8 @@ TEST(ClipMemory, OfReadingGrowsWithWhatIsRead) {
   }
 }
 
-// Curves that rest and names that repeat the one before are a few bytes of the file each. A reader
-// that is open has the head and the index, and of one block what is not yet a value.
+// Resting curves and names that repeat the one before take a few bytes of the file each. An open
+// reader keeps the head, the index, and one block in encoded form.
 TEST(ClipMemory, OfAnOpenReaderGrowsWithTheFile) {
   for (const std::size_t count : {5'000u, 10'000u}) {
     Clip clip = make_clip(count, 20);

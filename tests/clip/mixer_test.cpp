@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Playing a mixer takes no memory and throws nothing; what it is made of is checked.
+// Playing a mixer allocates nothing and throws nothing; its parts are checked when they are set.
 #include "clip/mixer/mixer.h"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ std::vector<float> frame(Mixer& mixer, double time, const float* base = nullptr)
   return out;
 }
 
-// Something of everything: an own time for each layer, reactions that sound, rules that act.
+// A bit of everything: different times for the layers, active reactions, rules that apply.
 Mixer full_mixer() {
   Mixer m = mixer();
   std::vector<Layer> layers;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Dna may have been edited: whatever stands in it, compile gives a Rig or an error with the
-// field.
+// A Dna may have been edited: compile gives a Rig or an error with the field, whatever it holds.
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -20,7 +19,7 @@ namespace {
 using namespace testing_support;
 using core::ErrorCode;
 
-// Two raw controls, one corrective, one joint group, one channel, one map: everything once.
+// Two raw controls, one corrective, one joint group, one channel, one map.
 dna::Dna good_face() {
   dna::Dna dna = make_face(2, 1, 2);
   dna.definition.gui_control_names = names("gui", 1);
@@ -135,7 +134,8 @@ TEST(Compile, NeutralJointsTurnAsTheRigWritesRotations) {
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(q[i], wanted[i], 1e-6f) << i;
 }
 
-// A twist that shares its rotation with a swing is another kind than one alone.
+// A twist setup that shares its rotation with a swing is compiled to another kind than a single
+// twist.
 TEST(Compile, SwingsComeBeforeTwistsAndAreToldApart) {
   dna::Dna dna = good_face();
   dna::TwistSwingSetup alone, shared;
@@ -183,7 +183,7 @@ TEST(Compile, ChoicesThatTheFormatDoesNotKnowStayInsideTheRig) {
 }
 
 TEST(Compile, AGroupMayListItsControlsInAnyOrder) {
-  // By control, four of its columns lie three apart, but not side by side.
+  // By control, four of its columns lie three apart, but are not adjacent.
   const std::vector<std::uint16_t> inputs = {0, 2, 1, 3, 5, 4, 6, 7};
   constexpr std::size_t kRows = 9;
   std::vector<std::uint16_t> outputs(kRows);
@@ -206,7 +206,7 @@ TEST(Compile, AGroupMayListItsControlsInAnyOrder) {
 TEST(Compile, GeometryIsNotLookedAt) {
   dna::Dna dna = good_face();
   dna::Mesh mesh;
-  mesh.face_layouts = {7};  // of no vertex
+  mesh.face_layouts = {7};  // refers to no vertex
   mesh.face_offsets = {0, 1};
   dna.geometry.meshes = std::vector{mesh};
   std::vector<dna::Warning> warnings;
@@ -301,9 +301,9 @@ TEST(Compile, TheLastGroupThatTurnsAQuaternionJointWinsWhateverItsLods) {
             evaluate_once(must_compile(one), {1.0f}).joints);
 }
 
-// Joint 0 is there at both LODs, joint 1 at LOD 0 alone; column 1 turns nothing and column 5 only a
-// joint of Euler angles. LOD 1 finds column 3 empty, which changes places with 4, and then 0, which
-// changes places with 4 too: no stable sort.
+// Both LODs have joint 0, only LOD 0 has joint 1. Column 1 turns nothing and column 5 only a joint
+// with Euler angles. LOD 1 finds column 3 empty and swaps it with 4, and then column 0, which is
+// also swapped with 4: this is not a stable sort.
 TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
   const std::vector<bool> quaternions{true, true, false};
   const dna::JointGroup g = make_group({3, 1}, {0, 1, 2, 3, 4, 5}, {3, 13, 22},
@@ -315,8 +315,7 @@ TEST(Compile, ColumnsOfQuaternionsStandAsTheLodsSwappedThem) {
   EXPECT_EQ(quaternion_column_order(g, 1, quaternions), finest);
 }
 
-// LOD 1 has only the first of two rows for one angle; it is an angle there and no part of a
-// quaternion.
+// LOD 1 has only the first of two rows for one angle. It must still be an Euler angle there.
 TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   dna::Dna dna = make_face(1, 0, 1);
   dna.behavior.joint_groups = std::vector{make_group({2, 1}, {0}, {3, 3}, {60, 90})};
@@ -328,7 +327,7 @@ TEST(Compile, AnAngleWrittenTwiceIsTurnedAtEveryLod) {
   EXPECT_NEAR(evaluate_once(rig.value(), {1.0f}, 1).joints[3], 0.5f, 1e-6f);
 }
 
-// 60,000 correctives, each reading the next: the order must not cost their square.
+// 60,000 correctives, each reading the next: the time must not grow with the square.
 TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
   constexpr std::uint16_t n = 60000;
   dna::Dna dna = make_face(1, n, 1, 1);
@@ -344,7 +343,7 @@ TEST(Compile, LongChainOfCorrectivesCompilesInTime) {
   dna.behavior.psds.rows = rows;
   dna.behavior.psds.columns = columns;
   dna.behavior.psds.values = std::vector<float>(n, 1.0f);
-  const std::clock_t begin = std::clock();  // the process's own time, however busy the machine is
+  const std::clock_t begin = std::clock();  // the process's own time, independent of other load
   EXPECT_EQ(evaluate_once(must_compile(dna), {0.5f}).controls[1], 0.5f);
   EXPECT_LT(std::clock() - begin, 2 * CLOCKS_PER_SEC);
 }

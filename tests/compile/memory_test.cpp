@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What compiling takes from the heap, beside the size of the face.
+// Heap memory of compile in proportion to the size of the face.
 #include <gtest/gtest.h>
 
 #include "compile/compile.h"
@@ -12,7 +12,7 @@ namespace {
 
 using namespace testing_support;
 
-// The budget's own bounds, and once more for vectors that double and the lists beside.
+// Twice the budget's own limits, for vectors that double and for auxiliary lists.
 constexpr std::size_t kTimesTheFace = 64, kBeside = 2u << 20;
 
 struct Taken {
@@ -41,8 +41,7 @@ TEST_P(CompileMemory, GrowsWithTheFace) {
 INSTANTIATE_TEST_SUITE_P(Every, CompileMemory, testing::ValuesIn(kBombs),
                          [](const auto& about) { return std::string(about.param.name); });
 
-// Comparisons, counted: a search through a list of ranges takes four times as many for twice the
-// rows.
+// Counts comparisons: searching a list of ranges would take four times as many for twice the rows.
 TEST(CompileSteps, OfAGuiTableGrowWithItsRows) {
   const auto steps = [](std::uint16_t rows) {
     core::Budget budget("this test", core::Budget::kUnlimited, core::Budget::kUnlimited);

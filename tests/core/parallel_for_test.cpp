@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Ranges shared out to threads: each element once, and errors come back.
+// Threads share ranges: every element is visited once, and exceptions reach the caller.
 #include "core/parallel_for.h"
 
 #include <gtest/gtest.h>

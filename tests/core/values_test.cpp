@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Results, budgets and the containers of numbers: what they promise to those above.
+// Results, budgets and containers of numbers keep the promises that their users rely on.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -144,7 +144,8 @@ TEST(Array, WhatWasMovedFromIsEmpty) {
   Array<int> from{1, 2, 3};
   Array<int> to = std::move(from);
   EXPECT_EQ(to, (Array<int>{1, 2, 3}));
-  EXPECT_TRUE(from.empty());  // NOLINT(bugprone-use-after-move): that is what is tested
+  // NOLINT(bugprone-use-after-move): the test is about the moved-from value.
+  EXPECT_TRUE(from.empty());
   Array<int> assigned{9};
   assigned = std::move(to);
   EXPECT_EQ(assigned, (Array<int>{1, 2, 3}));

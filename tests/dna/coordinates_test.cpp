@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Conversion against matrices multiplied out here: a row vector v goes to v C, a matrix R to
-// transpose(C) R C, with C = (axes of the source) * transpose(axes of the target).
+// Compares conversions with matrix products computed here: a row vector v goes to v C, a matrix R
+// to transpose(C) R C, with C = (axes of the source) * transpose(axes of the target).
 #include "dna/convert/coordinates.h"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ constexpr double kEps = std::numeric_limits<float>::epsilon();
 constexpr Matrix kIdentity{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 constexpr std::array<const char*, 6> kSequences{"xyz", "xzy", "yxz", "yzx", "zxy", "zyx"};
 
-// ---- an independent way
+// ---- an independent computation
 
 Matrix product(const Matrix& a, const Matrix& b) {
   Matrix out{};
@@ -108,7 +108,7 @@ void expect_vectors(const Vec3Array& before, const Vec3Array& after, const Matri
   }
 }
 
-// Angles up to 180 degrees in float32: three of them err by less than 2 eps pi together.
+// Angles up to 180 degrees in float32: three of them together err by less than 2 eps pi.
 void expect_rotation(const Dna& from, const Row& before, const Dna& to, const Row& after) {
   const Matrix expected = Change(from, to).rotation(rotation_of(from, before));
   const Matrix result = rotation_of(to, after);
@@ -163,7 +163,7 @@ JointGroup make_group(std::vector<std::uint16_t> lods, std::vector<std::uint16_t
   return g;
 }
 
-// Joints at neutral 0, controls raw0 raw1 ...
+// Joints at neutral 0, and controls raw0, raw1 ...
 Dna bare_rig(std::size_t joints, std::size_t raw = 2) {
   Dna dna;
   dna.descriptor.lod_count = 1;
@@ -244,7 +244,7 @@ std::vector<std::uint8_t> bytes_of(const Dna& dna) {
   return bytes ? *bytes : std::vector<std::uint8_t>{};
 }
 
-// [9] of one joint and column.
+// The nine attributes of one joint in one column.
 std::array<double, 9> column_of(const JointGroup& g, std::size_t joint, std::size_t column) {
   std::array<double, 9> out{};
   const std::size_t columns = g.input_indices.size();
@@ -267,7 +267,7 @@ void expect_group(const Dna& from, const Dna& to) {
         EXPECT_NEAR(b[i], translation[i] * change.unit, 200 * kEps);
         EXPECT_EQ(std::abs(b[6 + i]), std::abs(scale[i]));
       }
-      // Of every scale delta of the source one of the result, with its sign.
+      // Each scale delta of the source occurs once in the result, with its sign.
       EXPECT_TRUE(std::is_permutation(a.begin() + 6, a.end(), b.begin() + 6));
       expect_rotation(from, {a[3], a[4], a[5]}, to, {b[3], b[4], b[5]});
     }
@@ -347,7 +347,7 @@ TEST(DnaCoordinates, PlacesAndSignsComeBackExactly) {
   }
 }
 
-// A rotation that is mixed twice errs by two roundings of each angle.
+// A rotation that is mixed twice has two rounding errors in each angle.
 TEST(DnaCoordinates, MixedRotationsComeBackAsRotations) {
   Random random(4);
   for (int n = 0; n < 500; ++n) {
@@ -381,7 +381,7 @@ TEST(DnaCoordinates, PolesKeepTheRotation) {
           const Dna to = converted(dna, target_of(all_axes()[random.below(48)], into, {1, 1, 1}));
           expect_rotation(dna, at(dna.definition.neutral_joint_rotations, 0), to,
                           at(to.definition.neutral_joint_rotations, 0));
-          const Dna back = converted(to, system_of(dna));  // the pole is the target's now
+          const Dna back = converted(to, system_of(dna));  // the target's gimbal lock this time
           expect_rotation(dna, at(dna.definition.neutral_joint_rotations, 0), back,
                           at(back.definition.neutral_joint_rotations, 0));
         }
@@ -392,10 +392,10 @@ TEST(DnaCoordinates, PolesKeepTheRotation) {
 
 TEST(DnaCoordinates, AtThePoleTheLastAngleIsZero) {
   Dna dna = bare_rig(1);
-  dna.descriptor_ext.rotation_sequence = 2;  // yxz: turning x by 30 and z by 90 ...
+  dna.descriptor_ext.rotation_sequence = 2;  // yxz: a turn about x by 30 and z by 90 degrees ...
   dna.definition.neutral_joint_rotations.values = std::vector<float>{30, 0, 90};
   CoordinateTarget target;
-  target.rotation_sequence = 1;  // ... in xzy is the pole
+  target.rotation_sequence = 1;  // ... is in gimbal lock in xzy
   const Dna out = converted(dna, target);
   EXPECT_EQ(out.definition.neutral_joint_rotations.values[1], 0);
   EXPECT_FLOAT_EQ(out.definition.neutral_joint_rotations.values[2], 90);
@@ -463,7 +463,7 @@ TEST(DnaCoordinates, ARowStaysInItsLods) {
   dna.descriptor.lod_count = 3;
   dna.behavior.joint_groups =
       std::vector<JointGroup>{make_group({4, 2, 0}, {3, 9, 1, 17}, {1, 2, 3, 4, 5, 6, 7, 8})};
-  // x right y up z front -> x front y right z up: the axes go round, xyz becomes yzx.
+  // x right y up z front -> x front y right z up: the axes rotate, so that xyz becomes yzx.
   const Dna out = converted(dna, target_of({4, 1, 2}, 3, {1, 1, 1}));
   const JointGroup& g = out.behavior.joint_groups[0];
   EXPECT_EQ(g.lods, (Array<std::uint16_t>{4, 2, 0}));
@@ -491,7 +491,7 @@ TEST(DnaCoordinates, MixedRotationRowsComeWithTheFirstOfThem) {
   EXPECT_EQ(warnings[1].where, "behavior.joint_groups[0].lods");
 }
 
-// Turning x by 90 and then y by 30 is turning z by -30 and then x by 90.
+// A turn about x by 90 and then y by 30 degrees equals one about z by -30 and then x by 90.
 TEST(DnaCoordinates, RotationRowsOfZerosAreLeftOut) {
   Dna dna = bare_rig(1, 1);
   dna.behavior.joint_groups = std::vector<JointGroup>{make_group({2}, {3, 4}, {90, 30})};
@@ -538,16 +538,16 @@ TEST(DnaCoordinates, QuaternionTargetsAndTwistAxesTurn) {
   quaternion.pose_indices = {0};
   quaternion.twist_axis = 1;
   plain = quaternion;
-  plain.raw_control_indices = {4, 5, 6, 7};  // Euclidean, and no name says quaternion
+  plain.raw_control_indices = {4, 5, 6, 7};  // Euclidean, and no control name says quaternion
   dna.rbf_behavior.solvers = std::vector<RbfSolver>{quaternion, plain};
   TwistSwingSetup setup;
   setup.input_control_indices = {0, 1, 2, 3};
   setup.twist_axis = 1;
   dna.twist_swing_behavior.twists = std::vector<TwistSwingSetup>{setup};
-  setup.twist_axis = 7;  // a file may say so
+  setup.twist_axis = 7;  // a file may contain an invalid axis
   dna.twist_swing_behavior.swings = std::vector<TwistSwingSetup>{setup};
   CoordinateTarget target;
-  target.axes = CoordinateSystem{1, 4, 2};  // y and z change places: a mirror
+  target.axes = CoordinateSystem{1, 4, 2};  // y and z are swapped: a mirror
   std::vector<Warning> warnings;
   const Dna out = converted(dna, target, &warnings);
   EXPECT_EQ(out.rbf_behavior.solvers[0].raw_control_values,
@@ -699,7 +699,7 @@ TEST(DnaCoordinates, RefusesRowsBeyondTheFormat) {
   target.axes = CoordinateSystem{0, 2, 4};
   EXPECT_EQ(converted(dna, target).behavior.joint_groups[0].output_indices[0], 65535);
 
-  // One row too many: 65,535 rows, of which the last turns a joint about a new third axis.
+  // One row too many: 65,535 rows, of which the last turns a joint about a third axis.
   dna = bare_rig(1, 1);
   std::vector<std::uint16_t> outputs(65533, 0);
   outputs.insert(outputs.end(), {3, 4});
@@ -735,12 +735,12 @@ TEST(DnaCoordinates, NumbersThatAreNoneStaySo) {
   const Array<float>& r = out.definition.neutral_joint_rotations.values;
   for (std::size_t p = 0; p < 3; ++p) {
     EXPECT_TRUE(std::isnan(r[p * 3]) && std::isnan(r[p * 3 + 1])) << p;
-    EXPECT_LE(std::abs(r[p * 3 + 2]), 180) << p;  // of a huge angle
+    EXPECT_LE(std::abs(r[p * 3 + 2]), 180) << p;  // even for a huge angle
   }
   for (const float v : out.behavior.joint_groups[0].values) EXPECT_TRUE(std::isnan(v));
 }
 
-// Whatever parse accepts converts or is refused; what was converted is as sound as its source.
+// Every file that parse accepts is converted or refused, and the result is as sound as its source.
 void expect_sound(const std::vector<std::uint8_t>& bytes, const CoordinateTarget& target) {
   bytes::SpanSource source(bytes);
   const core::Result<Dna> dna = parse(source);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files that are cut short, patched and malformed: each gives a Dna that can be used in every way,
-// or an error with a field and an offset.
+// Files that are cut short, patched and malformed: each gives a Dna that is usable in every way, or
+// an error with a field and an offset.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -37,7 +37,8 @@ Bytes golden(const std::string& name) {
   return bytes;
 }
 
-// What the many files of a golden have time for: one promise in every third turn.
+// There are too many variants of a golden file for all promises: each is tested in every third
+// turn.
 std::string one_promise(const Bytes& bytes, std::size_t turn) {
   const auto dna = promises::parse(bytes);
   if (!dna || turn % 3 != 0) return promises::reading(bytes, dna);
@@ -63,8 +64,8 @@ void expect_of_every_prefix(const Bytes& bytes, Check check) {
   }
 }
 
-// Each of these bytes in turn becomes 0x00, 0xFF, and itself with one bit flipped. check gets a
-// turn that is another one for each of the three.
+// Each of these bytes in turn becomes 0x00, 0xFF, and itself with one bit flipped. The turn that
+// check receives differs for the three.
 template <class Check>
 void expect_of_every_patch(const Bytes& bytes, const std::vector<std::size_t>& places,
                            Check check) {
@@ -90,7 +91,7 @@ const auto kEverything = [](const Bytes& bytes, std::size_t turn) {
   return promises::everything(bytes, turn);
 };
 
-// ---- generated files, one of each version
+// ---- one generated file of each version
 
 class HostileFace : public testing::TestWithParam<std::uint16_t> {};
 
@@ -114,7 +115,7 @@ TEST_P(HostileFace, IsUsableOrRefusedWithEveryBytePatched) {
   expect_of_every_patch(bytes, bytes_to_change(bytes, newest), kEverything);
 }
 
-// A file whose every prefix is refused says so; only the end mark of 2.1 is missed with a warning.
+// Every prefix of a file is refused with an error; only the missing end mark of 2.1 is a warning.
 TEST_P(HostileFace, IsRefusedCutAtEveryByte) {
   const Bytes bytes = generated(GetParam());
   const std::size_t needed = bytes.size() - (GetParam() == 1 ? 3 : 0);
@@ -166,7 +167,7 @@ std::uint8_t hex_byte(const std::string& text, std::size_t at) {
   return static_cast<std::uint8_t>(std::stoul(text.substr(at, 2), nullptr, 16));
 }
 
-// An edit is offset:bytes that go:bytes that come (tests/data/malformed/README.md).
+// An edit is offset:bytes to remove:bytes to insert (tests/data/malformed/README.md).
 void apply_edit(const std::string& edit, const Bytes& base, std::size_t& copied, Bytes& out) {
   const std::size_t first = edit.find(':'), second = edit.find(':', first + 1);
   const std::size_t at = std::stoul(edit.substr(0, first));
@@ -208,9 +209,9 @@ TEST(HostileMalformed, FilesAreUsableOrRefusedAsTheirKindAsks) {
   }
 }
 
-// ---- a file that changes while it is read
+// ---- a file that changes during reading
 
-// From a read on, the lowest byte of every word is one more: counts, above all.
+// From a given read on, the lowest byte of every word is increased by one, which affects counts.
 class ChangingSource final : public bytes::Source {
  public:
   ChangingSource(const Bytes& bytes, std::size_t honest_reads, std::uint64_t phase)
@@ -232,7 +233,7 @@ class ChangingSource final : public bytes::Source {
   std::uint64_t phase_;
 };
 
-// Faces and skin weights are read twice, first to count; they are longer than the reader's window.
+// Faces and skin weights are read twice, the first time to count; they are longer than the window.
 TEST(HostileSource, ThatChangesBetweenTwoReadsIsNoHarm) {
   dna::Dna face = testing_support::make_full_face();
   constexpr std::uint32_t kCount = 30000;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Limits stop what passes them, and nothing else; JSON that is no JSON, or says things twice, is
-// refused with its place.
+// Limits stop only input that exceeds them. Text that is not JSON, or repeats a member, is refused
+// with its place.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ core::Result<Dna> parse_within(const Bytes& bytes, const Limits& limits) {
   return parse(source, options);
 }
 
-// At the limit a file is read; one less is an error that says so.
+// A file at the limit is read; with a limit lower by one, the error names the limit.
 void expect_limit(const Bytes& bytes, const Limits& enough, const Limits& too_little,
                   const std::string& where) {
   const auto read = parse_within(bytes, enough);
@@ -113,7 +113,7 @@ TEST(DnaLimits, StopATextThatIsTooDeep) {
   expect_json_limit(enough, too_little, "");
 }
 
-// ---- JSON that is refused
+// ---- refused JSON
 
 const std::string kBegin = R"({"version": {"generation": 2, "version": 8})";
 
@@ -204,7 +204,7 @@ TEST(DnaJson, KeepsTheSmallestAndLargestFloats) {
 
 // ---- steps
 
-// Rows of which every third is dropped; counts how often one is asked for.
+// Rows of which every third is dropped; counts the queries.
 class CountingRows {
  public:
   explicit CountingRows(std::size_t size) : size_(size) {}
@@ -220,7 +220,7 @@ class CountingRows {
   mutable std::size_t asked_ = 0;
 };
 
-// A file may list any number of LODs, and each of them all rows.
+// A file may list any number of LODs, each with all rows.
 TEST(DnaSteps, OfDroppingRowsDoNotGrowWithTheListOfLods) {
   constexpr std::uint16_t kMost = 65535;
   for (const std::size_t entries : {1u, 5000u}) {

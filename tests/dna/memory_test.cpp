@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a load takes from the heap, at most and for good.
+// Heap memory of a load: its peak, and the memory that remains.
 #include <cstdio>
 #include <filesystem>
 
@@ -41,7 +41,7 @@ void expect_little_more_than_is_kept(bytes::Source& source, const ParseOptions& 
   const auto dna = parse(source, options);
   const std::size_t peak = heap.peak(), kept = heap.kept();
   ASSERT_TRUE(dna.has_value()) << dna.error().describe();
-  EXPECT_GT(kept, 500'000u);  // else the reader's window would be what is measured
+  EXPECT_GT(kept, 500'000u);  // otherwise the reader's window would dominate
   EXPECT_LE(static_cast<double>(peak), 1.3 * static_cast<double>(kept));
 }
 
@@ -79,8 +79,8 @@ TEST(Memory, OfALoadIsLittleMoreThanWhatItKeeps) {
   std::filesystem::remove(path);
 }
 
-// An empty element takes up to 11 times its bytes in the file (a setup of twists; a list of lists
-// 9). The error's text and the path to its field are small.
+// An empty element takes up to 11 times its bytes in the file (a twist setup; a list of lists takes
+// 9). The error's text and path are small.
 constexpr std::size_t kTimesTheBytes = 12, kBeside = 16 * 1024;
 
 std::size_t peak_of(const Bytes& bytes, bool* good = nullptr) {
@@ -117,7 +117,7 @@ TEST(Memory, AFileThatAnnouncesMuchGetsLittle) {
 
 using Fill = void (*)(Dna&, std::size_t);
 
-// Lists of elements without anything in them.
+// Lists of empty elements.
 const Fill kFills[] = {
     [](Dna& d, std::size_t n) { d.definition.raw_control_names.resize(n); },
     [](Dna& d, std::size_t n) { d.descriptor.metadata.resize(n); },
@@ -159,12 +159,11 @@ TEST(Memory, ManyEmptyElementsTakeAFewTimesTheirBytes) {
   }
 }
 
-// Numbers of elements that a list which doubles has no room for: it holds both lists while it
-// grows.
+// Sizes just above a doubling list's capacity: the list holds both buffers while it grows.
 constexpr std::size_t kSizes[] = {4097, 8193};
-// Windows, messages, and the stack of what is open.
+// Windows, messages, and the stack of open containers.
 constexpr std::size_t kBesideOthers = 64 * 1024;
-// The factors stand in native/README.md.
+// native/README.md documents the factors.
 constexpr std::size_t kTimesToJson = 48, kTimesFromJson = 64, kTimesFiltered = 24;
 
 std::size_t size_of(const Dna& dna) { return static_cast<std::size_t>(size_in_bytes(dna)); }
@@ -222,7 +221,7 @@ TEST(Memory, OfTheLodFilterOfAHeadIsAtMostTwiceTheHead) {
   }
 }
 
-// Numbers and texts that are longer as text than as bytes.
+// Numbers and texts that are longer in JSON than in the file.
 TEST(Memory, OfJsonGrowsWithItsNumbersAndTexts) {
   for (const std::size_t n : {std::size_t{30'000}, std::size_t{60'000}}) {
     Dna dna;

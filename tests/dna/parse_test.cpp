@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Bytes worked out by hand from the format, so that parser and writer are not only each other's
-// witnesses; and the promises about hostile input that need native code to see.
+// Bytes worked out by hand from the format, so that parser and writer do not only confirm each
+// other; and promises about hostile input that only native code can check.
 #include "dna/file/parse.h"
 
 #include <gtest/gtest.h>
@@ -41,8 +41,7 @@ const Bytes kDescriptorFile = {
     0,   0,   0,   1,   'k', 0,   0, 0,  2,   'v', 'w', 0, 1, 0, 1,  // metres, radians
     0,   1,   0,   2,   0,   4,                                      // axes
     0,   3,   0,   1,                                                // LOD count, first LOD
-    0,   0,   0,   0,   0,   0,   0, 1,  'd', 0};  // complexity, database; one byte that nobody
-                                                   // knows
+    0,   0,   0,   0,   0,   0,   0, 1,  'd', 0};  // complexity, database; one unknown byte
 
 TEST(DnaParse, ReadsADescriptorWorkedOutByHand) {
   core::Result<Dna> dna = parse_bytes(kDescriptorFile);
@@ -59,7 +58,7 @@ TEST(DnaParse, ReadsADescriptorWorkedOutByHand) {
   EXPECT_EQ(d.lod_count, 3);
   EXPECT_EQ(d.max_lod, 1);
   EXPECT_EQ(d.db_name, "d");
-  ASSERT_EQ(dna->warnings.size(), 1u);  // the byte too many
+  ASSERT_EQ(dna->warnings.size(), 1u);  // one warning, for the extra byte
   EXPECT_EQ(dna->warnings[0].where, "descriptor");
   EXPECT_EQ(dna->warnings[0].offset, 77u);
 }
@@ -115,7 +114,7 @@ TEST(DnaParse, RefusesLayersOutsideTheFile) {
 
 TEST(DnaParse, KeepsUnknownLayersInTheirPlace) {
   Bytes bytes = kDescriptorFile;
-  bytes[11] = 'x';  // an id that nobody knows
+  bytes[11] = 'x';  // an unknown id
   core::Result<Dna> dna = parse_bytes(bytes);
   ASSERT_TRUE(dna.has_value());
   ASSERT_EQ(dna->unknown_layers.size(), 1u);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a partial load leaves alone: which bytes of a file are read, and how often. Where layers,
-// meshes and lists lie is worked out from the file's own index and the sizes in the format, not by
-// the parser.
+// Which bytes of a file a partial load reads, and how often. The positions of layers, meshes and
+// lists come from the file's index and the sizes in the format, not from the parser.
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -15,8 +14,8 @@ namespace {
 
 using namespace testing_support;
 
-// The first read after a jump, and the most that is read at once: what lies behind the last thing
-// that was wanted may be read by as much as was read in sequence before it, up to the window.
+// The first read after a jump, and the largest read. Behind the last wanted byte the reader may
+// read as much as it read in sequence before, up to the window.
 constexpr std::size_t kFirstRead = 512, kWindow = 64 * 1024;
 
 struct Region {
@@ -60,7 +59,7 @@ std::size_t u32_at(const Bytes& bytes, std::size_t at) {
          std::size_t{bytes[at + 2]} << 8 | bytes[at + 3];
 }
 
-// ---- where things lie
+// ---- positions in the file
 
 struct File {
   Bytes bytes;
@@ -105,7 +104,7 @@ std::size_t target_bytes(const BlendShapeTarget& t) {
   return 4 * list(t.vertex_indices.size(), 4) + 2;
 }
 
-// Bodies of elements that are preceded by their size or, in 2.1, by the offset of their end.
+// Bodies of elements, which are preceded by their size or, in 2.1, by the offset of their end.
 std::vector<Region> sized_elements(const File& file, std::size_t at, std::size_t n) {
   std::vector<Region> out;
   for (std::size_t i = 0; i < n; ++i) {
@@ -121,7 +120,7 @@ std::vector<Region> meshes_of(const File& file) {
   return sized_elements(file, at + 4, u32_at(file.bytes, at));
 }
 
-// A mesh ends with its targets.
+// The targets are the end of a mesh.
 Region targets_of(const Region& mesh, const Mesh& m) {
   std::size_t bytes = 4;
   for (const BlendShapeTarget& t : m.blend_shape_targets) bytes += target_bytes(t);
@@ -161,7 +160,7 @@ ParseOptions nothing() {
 struct Load {
   const char* name;
   ParseOptions options;
-  std::vector<std::string> asked;  // beside the descriptor
+  std::vector<std::string> asked;  // in addition to the descriptor
 };
 
 std::vector<Load> loads_by_layer() {
@@ -190,8 +189,8 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::ranges::find(names, name) != names.end();
 }
 
-// Layers that say how many controls they have: with a definition that number is read. Poses of
-// layer rbfb are controls where rbfe is empty, and their number lies behind the solvers.
+// Layers that contain a count of controls: a load with a definition reads that count. In files with
+// an empty rbfe the poses of rbfb are controls, and their count lies behind the solvers.
 bool counts_controls(const File& file, const std::string& layer) {
   const bool in_rbfb = layer == "rbfb" && file.layers.at("rbfe").size() == 8;
   return layer == "bhvr" || layer == "controls" || layer == "mlbh" || layer == "rbfe" || in_rbfb;
@@ -205,7 +204,8 @@ void expect_only_asked_layers(const File& file, const Load& load) {
     SCOPED_TRACE(name);
     if (name == "desc" || name == "dsce" || contains(load.asked, name)) {
       EXPECT_EQ(source.touched(region), region.size());
-    } else if (region.begin >= kFirstRead) {  // the header is read with what lies behind it
+      // The header is read together with the bytes behind it.
+    } else if (region.begin >= kFirstRead) {
       const bool counted = load.options.definition && counts_controls(file, name);
       EXPECT_LE(source.touched(region), counted ? (name == "rbfb" ? kFirstRead : 4) : 0);
     }
@@ -289,7 +289,7 @@ bool keeps(const Selection& s, std::size_t lod) {
   return std::ranges::find(s.kept, lod) != s.kept.end();
 }
 
-// slack   what is read along with the number of elements, for the first of them
+// In: slack  bytes that are read together with the number of elements, for the first element
 void expect_whole_or_untouched(const RecordingSource& source, const Region& element, bool kept,
                                std::size_t slack) {
   if (kept) {
@@ -314,7 +314,7 @@ TEST(PartialLoad, ReadsNothingOfADroppedMesh) {
   }
 }
 
-// The mesh of all LODs: four small reads find out where a dropped target ends.
+// The mesh of all LODs: four small reads find the end of a dropped target.
 TEST(PartialLoad, PassesOverDroppedTargetsOfAKeptMesh) {
   const Mesh mesh = make_head().geometry.meshes[4];
   for (const std::uint16_t minor : {std::uint16_t{8}, std::uint16_t{1}}) {
@@ -404,7 +404,7 @@ TEST(PartialLoad, ByLodIsTheWholeFilteredByLod) {
   }
 }
 
-// Every vertex of mesh 0 hangs on three joints; LOD 1 has the first two of them.
+// Every vertex of mesh 0 has three joints; LOD 1 has the first two of them.
 TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   Dna head = make_head(tiny_head());
   Mesh& mesh = head.geometry.meshes[2];
@@ -420,14 +420,14 @@ TEST(PartialLoad, LeavesAVertexTheSumOfItsWeights) {
   ASSERT_EQ(dna.geometry.meshes.size(), 2u);
   const Mesh& cut = dna.geometry.meshes[1];
   EXPECT_EQ(cut.skin_offsets, (Array<std::uint32_t>{0, 2, 3, 4, 5}));
-  // 0.5 and 0.25 grow by 1 / 0.75; the vertex that lost all its joints hangs on the root.
+  // 0.5 and 0.25 grow by 1 / 0.75; a vertex without remaining joints belongs to the root.
   const float grow = 1.0f / 0.75f;
   EXPECT_EQ(cut.skin_weights, (Array<float>{0.5f * grow, 0.25f * grow, 1.0f, 1.0f, 1.0f}));
   EXPECT_EQ(cut.skin_joint_indices, (Array<std::uint16_t>{0, 1, 0, 1, 0}));
 }
 
-// The control of the first channel, of those of full_face.h: the last raw one, the corrective, both
-// of the networks, and the RBF pose. A channel goes with the layer that computes its control.
+// The controls of the first channel in full_face.h: the last raw one, the corrective, both of the
+// networks, and the RBF pose. A channel is dropped with the layer that computes its control.
 TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
   for (std::uint16_t control = 4; control <= 8; ++control) {
     Dna face = make_full_face();
@@ -444,7 +444,7 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
           control < 6 || (control < 8 ? options.machine_learned_behavior : options.rbf_behavior);
       const auto& inputs = dna.behavior.blend_shape_channels.input_indices;
       EXPECT_EQ(inputs.size(), is_computed ? 2u : 1u) << control << ", layers " << layers;
-      // The first channel is "wide", with a target of each mesh; "open" has one alone.
+      // The first channel, "wide", has a target in each mesh; "open" has a single one.
       std::size_t targets = 0;
       for (const Mesh& m : dna.geometry.meshes) targets += m.blend_shape_targets.size();
       EXPECT_EQ(targets, is_computed ? 3u : 1u) << control << ", layers " << layers;
@@ -452,7 +452,7 @@ TEST(PartialLoad, LeavesOutChannelsOfControlsThatAreNotLoaded) {
   }
 }
 
-// Where no layer names the controls of RBF poses, as before 2.5, the solvers' poses are counted.
+// If no layer names the controls of RBF poses, as before 2.5, the poses of the solvers count.
 TEST(PartialLoad, SaysWherePosesCannotBeCounted) {
   Dna face = make_full_face();
   face.rbf_behavior_ext = {};
@@ -473,7 +473,7 @@ TEST(PartialLoad, SaysWhereAJointIndexIsTooLarge) {
   const Dna head = make_head(tiny_head());
   Bytes bytes = write_head(head, 8);
   const Region mesh = meshes_of(describe_file(bytes))[0];
-  // The last vertex's last joint lies just before the targets; it has six of each.
+  // The last vertex's last joint lies just before the targets; there are six of each.
   const std::size_t at = targets_of(mesh, head.geometry.meshes[0]).begin - 2;
   bytes[at + 1] = 77;
   for (const bool one_lod : {true, false}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the fuzz targets found (tests/data/fuzz, by number), and what was wrong with it.
+// Findings of the fuzz targets (tests/data/fuzz, by number) and the fault behind each.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ std::vector<dna::Finding> checked(const Bytes& bytes) {
   return dna::check(source);
 }
 
-// Finds that have this field, each with a place in the file.
+// Number of findings for this field that have a place in the file.
 std::size_t placed(const std::vector<dna::Finding>& findings, const std::string& where,
                    std::size_t file_size) {
   return static_cast<std::size_t>(std::ranges::count_if(findings, [&](const dna::Finding& f) {
@@ -40,7 +40,7 @@ core::Error json_error(const std::string& name) {
   return dna ? core::Error{} : dna.error();
 }
 
-// A 2.1 load without the behavior forgot that its correctives have places in the control space.
+// A 2.1 load without the behavior ignored the places of its correctives in the control space.
 TEST(FuzzFind001, CountsTheCorrectivesThatA21LoadLeavesOut) {
   dna::ParseOptions options;
   options.behavior = false;
@@ -49,7 +49,7 @@ TEST(FuzzFind001, CountsTheCorrectivesThatA21LoadLeavesOut) {
   EXPECT_EQ(dna->unread_controls.psd, 1u);
 }
 
-// The offset was the one that the index announced, behind the file's end.
+// The error gave the offset in the index, which lies behind the file's end.
 TEST(FuzzFind002, PlacesALayerBeyondTheEndInTheFile) {
   const Bytes bytes = find("002-layer-beyond-the-end.dna");
   EXPECT_EQ(placed(checked(bytes), "rbf_behavior", bytes.size()), 1u);
@@ -62,8 +62,7 @@ TEST(FuzzFind003, PlacesAListAsAWhole) {
   EXPECT_EQ(placed(checked(bytes), where, bytes.size()), 1u);
 }
 
-// Nor had those about a layer that is not in the file: they lie in the index, which does not list
-// it.
+// Messages about a missing layer had no offset: their place is the index that does not list it.
 TEST(FuzzFind004, PlacesAMissingLayerInTheIndex) {
   const auto findings = checked(find("004-no-descriptor.dna"));
   const auto axes = std::ranges::find_if(findings, [](const dna::Finding& f) {
@@ -80,19 +79,19 @@ TEST(FuzzFind005, PlacesALayerThatCouldNotBeReadInTheFile) {
   EXPECT_EQ(promises::checking(bytes, promises::parse(bytes).has_value()), "");
 }
 
-// Neither field nor offset.
+// The error had neither field nor offset.
 TEST(FuzzFind006, NamesAnUnknownMemberAtTheRoot) {
   EXPECT_EQ(json_error("006-unknown-member-at-the-root.json").where, "mleh1.0");
 }
 
-// The second member replaced the first without a word; then, neither field nor offset.
+// The second member silently replaced the first; later, the error had neither field nor offset.
 TEST(FuzzFind007, RefusesAMemberWithoutANameTwice) {
   const core::Error error = json_error("007-member-without-a-name-twice.json");
   EXPECT_EQ(error.code, core::ErrorCode::kInvalidValue);
   EXPECT_EQ(error.where, "\"\"");
 }
 
-// All behind the zero byte was passed over.
+// Text behind the zero byte was ignored.
 TEST(FuzzFind008, RefusesATextWithAZeroByte) {
   const core::Error error = json_error("008-zero-byte.json");
   EXPECT_EQ(error.code, core::ErrorCode::kNotDna);
@@ -100,7 +99,7 @@ TEST(FuzzFind008, RefusesATextWithAZeroByte) {
   EXPECT_NE(error.message.find("zero byte"), std::string::npos);
 }
 
-// Rows, and no column with a value: a batch stepped from a null pointer, though it read nothing.
+// Rows without a column with a value: a batch advanced a null pointer, though it read nothing.
 TEST(FuzzFind009, EvaluatesRowsWithoutColumnsInBatches) {
   const auto dna = promises::parse(find("009-no-column-with-a-value.dna"));
   ASSERT_TRUE(dna.has_value()) << dna.error().describe();
@@ -116,8 +115,8 @@ TEST(FuzzFind010, RefusesToCompileMoreControlsThanIndicesReach) {
   EXPECT_EQ(promises::evaluation(*dna, 0), "");
 }
 
-// One finding for each level whose rows are beyond the table: more of the heap than a few times
-// the file.
+// One finding for each level whose rows exceed the table took more than a few times the file's
+// size.
 TEST(FuzzFind011, SaysOnceWhatIsWrongWithTheLevelsOfATable) {
   const auto findings = checked(find("011-rows-of-levels-beyond-the-table.dna"));
   const auto of_levels = [](const dna::Finding& f) {

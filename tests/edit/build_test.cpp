@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What dense groups hold, and in which order.
+// The content of dense groups and its order.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

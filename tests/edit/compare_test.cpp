@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Both faces are timed where it is asked.
+// Both faces are timed if timing is requested.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {

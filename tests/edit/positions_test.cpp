@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a joint moved, through its parents.
+// The position of a joint includes the motion of its parents.
 #include <cmath>
 
 #include "edit/regrouped.h"
@@ -10,7 +10,7 @@ namespace {
 using namespace regrouping;
 
 TEST(Regroup, NamesThePoseWhereAJointMovedMost) {
-  // Joint 0 turns by a foreign degree; joint 1 is its child, 10 cm away.
+  // A foreign control turns joint 0 by a degree; its child joint 1 is 10 cm away.
   dna::Dna dna = with_outliers(0.0f, 0.0f);
   std::vector<float> places(36, 0.0f);
   places[1] = 10.0f;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which joints come together.
+// Which joints share a region.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {
@@ -7,8 +7,8 @@ namespace {
 
 using namespace regrouping;
 
-// Two halves of the joints, each by a control of its own. The other half's control moves each fifth
-// a little, which shows no kinship as long as what is small is left out of the search.
+// Two halves of the joints, each driven by its own control. The control of one half moves every
+// fifth joint of the other a little, which the search ignores as long as it ignores small values.
 TEST(Regroup, FindsRegionsByWhatIsNotSmall) {
   constexpr std::uint16_t kHalf = 40;
   dna::Dna dna = make_face(2, 0, 2 * kHalf);

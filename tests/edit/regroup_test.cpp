@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Faces and options that regroup takes or refuses.
+// Faces and options that regroup accepts or refuses.
 #include <limits>
 #include <ostream>
 #include <utility>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Faces with other joint groups, and what the tests of native/edit ask of them.
+// Regrouped faces, and checks that the tests of native/edit share.
 #pragma once
 
 #include <cstdint>
@@ -37,7 +37,7 @@ inline std::vector<float> joints_of(const dna::Dna& dna, const std::vector<float
   return evaluate_once(rig.value(), raw, lod).joints;
 }
 
-// Every LOD, both forms of rotation, to the last bit.
+// Compares every LOD and both forms of rotation, to the last bit.
 inline void expect_same_function(const dna::Dna& a, const dna::Dna& b,
                                  const std::vector<float>& raw) {
   for (std::uint32_t lod = 0; lod < a.descriptor.lod_count; ++lod) {
@@ -51,7 +51,7 @@ inline void expect_same_function(const dna::Dna& a, const dna::Dna& b,
 
 inline Indices list(const core::Array<std::uint16_t>& a) { return Indices(a.begin(), a.end()); }
 
-// Joint 0 by control 0 and joint 1 by control 1, in one group with the zeros between.
+// Control 0 drives joint 0 and control 1 joint 1, in one group with zeros between them.
 inline dna::Dna two_joints() {
   dna::Dna dna = make_face(2, 0, 2);
   dna.behavior.joint_groups =
@@ -59,7 +59,7 @@ inline dna::Dna two_joints() {
   return dna;
 }
 
-// Twelve joints that control 0 moves; control 1 is foreign.
+// Twelve joints that control 0 moves; control 1 is foreign to their region.
 inline dna::Dna with_outliers(float small, float large) {
   dna::Dna dna = make_face(2, 0, 12);
   Indices outputs;

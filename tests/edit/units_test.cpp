@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rows freed from their groups mean what they meant.
+// Units keep the meaning of the rows from their groups.
 #include "edit/regrouped.h"
 
 namespace risorius::edit {
@@ -16,7 +16,7 @@ TEST(Regroup, ThresholdsCountInTheFilesUnits) {
 }
 
 TEST(Regroup, KeepsQuaternionJointsWhole) {
-  // Columns out of order and one of them twice: the product of rotations knows the difference.
+  // Columns out of order and one of them twice: the product of rotations depends on the order.
   dna::Dna dna = make_face(3, 0, 3);
   dna.behavior.joint_groups =
       std::vector{make_group({4, 3}, {2, 0, 2, 1}, {12, 14, 13, 0},
@@ -34,7 +34,8 @@ TEST(Regroup, KeepsQuaternionJointsWhole) {
 }
 
 TEST(Regroup, TheLastWriterOfARowStillWins) {
-  // At LOD 1 the second group is gone and the first one's row shows; the third hides one for good.
+  // At LOD 1 the second group is absent and the first one's row shows; the third hides a row at
+  // every LOD.
   dna::Dna dna = make_face(2, 0, 2);
   dna.behavior.joint_groups =
       std::vector{make_group({2, 2}, {0}, {0, 9}, {1, 2}), make_group({2, 1}, {1}, {1, 0}, {3, 4}),

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Bytes of a clip's file, whose checksums are put right; of a block's curves; or values to be kept.
-// The first 4 bytes say which, and of how many controls and frames.
+// Bytes of a clip's file with corrected checksums, bytes of a block's curves, or values to store.
+// The first 4 bytes choose the kind and the numbers of controls and frames.
 #include "fuzz/promise.h"
 #include "support/clips.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whatever parses is converted to the system that the first 8 bytes choose.
+// Every file that parses is converted to the system that the first 8 bytes choose.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

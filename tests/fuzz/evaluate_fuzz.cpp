@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Whatever parses is compiled and evaluated; the first 4 bytes seed the controls.
+// Every file that parses is compiled and evaluated; the first 4 bytes seed the controls.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;
@@ -10,7 +10,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 4) return 0;
   const auto dna = promises::parse({data + 4, size - 4});
   if (!dna) return 0;
-  // Correctives are a number in the file: lists of all controls for each LOD and each frame.
+  // The number of correctives is one number in the file: lists of all controls for each LOD and
+  // frame.
   constexpr std::size_t kFrames = 64;
   const std::size_t lods = dna->descriptor.lod_count;
   bound.allow(16 * (lods + kFrames) * dna->behavior.psd_count);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A target with a mistake in it: takes the square of its input from the heap. What counts
-// the heap is seen to fail with it: a seed is large enough for it.
+// A deliberately faulty target that allocates the square of its input. The heap bound must catch
+// it; one seed is large enough.
 #include <vector>
 
 #include "fuzz/promise.h"
@@ -8,6 +8,6 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t*, std::size_t size) {
   const risorius::fuzz::HeapBound bound(size, 64, 1u << 20);
   const std::vector<char> square(size * size);
-  const char* volatile seen = square.data();  // else the compiler may leave the vector out
+  const char* volatile seen = square.data();  // keeps the compiler from removing the vector
   return seen == nullptr && size > 0 ? 1 : 0;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Any text: what from_json accepts survives to_json and back.
+// Any text: text that from_json accepts survives to_json and back.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// make_seeds FOLDER FILE.dna ...: the first inputs of each fuzz target, in FOLDER/<target>: faces
-// of every version made here, and the given files, as far as they are small.
+// make_seeds FOLDER FILE.dna ...: writes the first inputs of each fuzz target to FOLDER/<target>:
+// generated faces of every version, and the given files if they are small.
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -27,7 +27,7 @@ constexpr std::size_t kLargestSeed = 4400;  // larger ones make every run slow
 constexpr std::size_t kLargestBomb = 8000;
 constexpr std::size_t kOptions = risorius::promises::kOptionBytes;
 
-// What a target expects before the file; several of them make several seeds.
+// The bytes that a target expects before the file; several give several seeds.
 const std::vector<Bytes> kFilters{{0, 0, 0, 0, 0, 0, 0, 0},       {0, 0x20, 1, 0, 0, 0, 0, 0},
                                   {0, 0x80, 0, 0, 0, 0, 0, 0},    {0x1D, 0x83, 1, 0, 0, 0, 0, 0},
                                   {0, 0x14, 0, 0, 200, 20, 9, 0}, {0, 0x0C, 0, 0, 0, 0, 0, 3}};
@@ -62,16 +62,16 @@ class Seeds {
     add_rig(name, *read);
   }
 
-  /// Lists that multiply each other, for `evaluate` to run once: each takes as long as a thousand
-  /// other inputs, so they are no seeds to change.
+  /// Lists that multiply each other, for `evaluate` to run once. Each takes as long as a thousand
+  /// other inputs, so that they are not used as seeds for mutation.
   void add_bomb(const std::string& name, const Bytes& file) {
     put_each("bombs", name, kControls, file, kLargestBomb);
   }
 
-  /// For the target with a mistake in it, which one run of this finds.
+  /// For the deliberately faulty target: one run with it finds the fault.
   void add_greedy() { put("greedy", "zeros", {}, Bytes(kLargestSeed, 0)); }
 
-  /// Rows that come back, and packed ones of each mode: the bytes of packed_fuzz.
+  /// Rows and packed buffers of each mode, as packed_fuzz reads them.
   void add_packed() {
     namespace author = risorius::author;
     using Mode = author::PackedMode;
@@ -130,7 +130,7 @@ class Seeds {
   void put(const std::string& target, const std::string& name, Bytes bytes, const Bytes& file,
            std::size_t largest = kLargestSeed) {
     bytes.insert(bytes.end(), file.begin(), file.end());
-    // Blocks of rigs are padded.
+    // Blocks of rigs are larger because they are padded.
     if (bytes.size() > (target == "rig" ? 4 : 1) * (largest + kOptions)) return;
     fs::create_directories(folder_ / target);
     std::ofstream out(folder_ / target / name, std::ios::binary);
@@ -146,7 +146,7 @@ Bytes written(const dna::Dna& face, std::uint16_t minor) {
   return *dna::write(face, {minor, false}, warnings);
 }
 
-// Each layer alone, and with the one that it extends: what is small is tried most often.
+// Each layer alone, and with the layer that it extends, because small inputs are tried most often.
 void add_parts(Seeds& seeds) {
   const dna::Dna face = risorius::testing_support::make_full_face();
   for (const dna::detail::KnownLayer& wanted : dna::detail::kLayers) {
@@ -166,7 +166,7 @@ void add_parts(Seeds& seeds) {
   seeds.add("unknown", *dna::write(unknown, {8, true}, warnings));
 }
 
-// Each as large as a seed may be, and so that its n * n steps take no second.
+// As large as a seed may be, and small enough that n * n steps take less than a second.
 void add_bombs(Seeds& seeds) {
   for (const risorius::testing_support::Bomb& bomb : risorius::testing_support::kBombs) {
     std::uint16_t n = 16;

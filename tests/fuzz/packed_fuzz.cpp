@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Packed buffers of meshes. The first 4 bytes say how they are packed, and how many rows there are;
-// where the first is odd the rest is rows, which come back as they were.
+// Packed buffers of meshes. The first 4 bytes choose the packing and the number of rows. If the
+// first byte is odd, the rest is rows, which must survive packing.
 #include "author/packed.h"
 #include "fuzz/promise.h"
 

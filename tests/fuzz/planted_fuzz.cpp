@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A target with a mistake in it: says of every second DNA file that it is good. What runs the
-// targets is seen to fail with it.
+// A deliberately faulty target that accepts every second DNA file. The script that runs the targets
+// must report it.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

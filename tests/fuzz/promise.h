@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A broken promise ends a fuzz target as a crash does: also the one that an input takes no more of
-// the heap than a few times its bytes.
+// A broken promise ends a fuzz target like a crash, including the promise that an input takes at
+// most a few times its size from the heap.
 #pragma once
 
 #include <sanitizer/allocator_interface.h>
@@ -23,7 +23,7 @@ inline void demand(const std::string& broken_promise) {
 
 namespace heap {
 
-// One thread allocates; what was there before an input is not counted.
+// One thread allocates; memory allocated before an input is not counted.
 inline std::ptrdiff_t now = 0, most = 0;
 
 inline void added(const volatile void*, std::size_t size) {
@@ -31,7 +31,7 @@ inline void added(const volatile void*, std::size_t size) {
   most = std::max(most, now);
 }
 inline void freed(const volatile void* p) {
-  // Of what it does not own the sanitizer would say so and end.
+  // The sanitizer reports a block that it does not own and ends the process.
   auto* block = const_cast<void*>(p);
   if (__sanitizer_get_ownership(block) == 0) return;
   now -= static_cast<std::ptrdiff_t>(__sanitizer_get_allocated_size(block));
@@ -40,7 +40,7 @@ inline const int kInstalled = __sanitizer_install_malloc_and_free_hooks(added, f
 
 }  // namespace heap
 
-/// Demands of one input that its peak stays below beside + times * its size.
+/// Demands that the peak of one input stays below beside + times * its size.
 class HeapBound {
  public:
   HeapBound(std::size_t size, std::size_t times, std::size_t beside)
@@ -57,7 +57,7 @@ class HeapBound {
            " bytes of the heap, at most " + std::to_string(most_) + " were expected");
   }
 
-  /// For what an input announces by numbers that no list backs.
+  /// For sizes that an input announces as a number without a list behind it.
   void allow(std::size_t bytes) { most_ += bytes; }
 
  private:

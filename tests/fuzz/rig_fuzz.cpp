@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Bytes of a compiled rig, as they may come from a cache: what the check accepts can be evaluated.
-// The first 4 bytes seed the controls.
+// Bytes of a compiled rig, as from a cache: a block that the check accepts can be evaluated. The
+// first 4 bytes seed the controls.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

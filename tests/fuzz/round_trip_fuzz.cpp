@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Whatever parses is written, read and written again for its own version, and for one that the last
-// byte chooses or through JSON.
+// Every file that parses is written, read and written again in its own version, and in one that the
+// last byte chooses or as JSON.
 #include "fuzz/promise.h"
 
 namespace promises = risorius::promises;

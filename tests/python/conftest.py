@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where test data lies, and the extras that need data which a clone does not have."""
+"""Folders of test data, and extras that need data outside a clone."""
 
 import contextlib
 import json
@@ -22,8 +22,8 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def evaluations(tag: str | None = None) -> list[tuple[str, str, dict[str, object]]]:
-    """(rig, tag, what its file says) of every evaluation in the golden set, or of those of a tag:
-    "" as loaded whole, ".quat" with quaternions, ".seq" through time, others filtered on load."""
+    """(rig, tag, what its file says) of every evaluation in the golden set, or with one tag: "" as
+    loaded whole, ".quat" with quaternions, ".seq" through time, others filtered on load."""
     found = []
     for path in sorted(GOLDEN_SET.glob("*.eval*.json")):
         name, _, rest = path.name.partition(".eval")
@@ -48,7 +48,7 @@ def lods_of(about: dict) -> list[int] | None:
 
 
 def require_extra(path: Path, what: str) -> Path:
-    """Skip an extra whose data a clone does not have; the summary names it."""
+    """Skip an extra whose data are missing; the summary names it."""
     if not path.exists():
         _not_run.add(what)
         pytest.skip(f"extra not run, no data: {what}")
@@ -69,7 +69,7 @@ def standard_controls():
 
 @contextlib.contextmanager
 def no_room(size):
-    """No file may become longer than so many bytes: as on a disk that is full by then."""
+    """Limit the length of files, as on a full disk."""
     import resource  # of POSIX
 
     before = resource.getrlimit(resource.RLIMIT_FSIZE)

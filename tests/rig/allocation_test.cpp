@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Evaluation takes no memory. The counter sees every operator new of this executable.
+// Evaluation allocates nothing. The counter sees every operator new of this executable.
 #include <limits>
 #include <ostream>
 #include <type_traits>
@@ -22,14 +22,14 @@ TEST(Allocation, CounterSeesAnAllocation) {
   EXPECT_GT(allocations, before);
 }
 
-// What must not throw says so: a stray exception would end the program, and none is written.
+// Functions that must not throw are noexcept: an exception would end the program.
 template <class F, class... Args>
 constexpr bool never_throws = std::is_nothrow_invocable_v<F, Args...>;
 using Evaluate = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
                           const PoseView&) noexcept;
 using EvaluatePose = void (*)(const Rig&, const float*, std::uint32_t, bool, Workspace&,
                               Pose&) noexcept;
-// A pointer to a noexcept function takes no other.
+// A pointer to a noexcept function accepts no other function.
 constexpr Evaluate kEvaluate = &evaluate;
 constexpr EvaluatePose kEvaluatePose = &evaluate;
 static_assert(never_throws<decltype(kEvaluate), const Rig&, const float*, std::uint32_t, bool,
@@ -44,7 +44,7 @@ static_assert(never_throws<decltype(&Instance::evaluate), Instance&, const float
 static_assert(never_throws<decltype(&Instance::set_lod), Instance&, std::uint32_t>);
 static_assert(never_throws<decltype(&Instance::set_mask), Instance&, std::size_t, float>);
 
-// A face with something of everything that is evaluated; the networks by operations or in a list.
+// A face with every part that is evaluated; networks run as operations or as a list.
 struct Kind {
   const char* name;
   bool operations;
@@ -73,9 +73,9 @@ Rig full_rig(const Kind& kind) {
   return std::move(rig).value();
 }
 
-constexpr std::size_t kFilm = 2 * simd::kFrames + 3;  // whole blocks and the rest of one
+constexpr std::size_t kFilm = 2 * simd::kFrames + 3;  // whole blocks and a partial one
 
-// [kFilm, 5]: at rest, usual, out of range, no numbers, and usual again.
+// [kFilm, 5]: at rest, usual, out of range, not finite, and usual again.
 std::vector<float> film() {
   constexpr float kInf = std::numeric_limits<float>::infinity();
   const float frames[][5] = {{0, 0, 0, 0, 1},

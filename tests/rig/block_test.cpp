@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A compiled face as bytes: whatever is done to them, they are a face or an error.
+// A compiled face as bytes: changed bytes are a valid face or an error.
 #include "rig/block.h"
 
 #include <gtest/gtest.h>
@@ -106,7 +106,7 @@ TEST(Block, EvaluatesAsTheRigThatItCameFrom) {
   }
 }
 
-// Compiled on a stack and a heap full of other things each time: no byte is left to chance.
+// Compiled with other data on stack and heap each time: no byte is left uninitialised.
 TEST(Block, EqualFacesAreEqualBytes) {
   const auto dirty = [](int value) {
     volatile unsigned char stack[65536];
@@ -183,7 +183,7 @@ int damage_each_byte(const BlockBytes& whole) {
   return refused;
 }
 
-// With its hash put right, what was changed must be found by the check of indices or do no harm.
+// After a change with a corrected hash, the check of indices finds it or evaluation does no harm.
 TEST(Block, ChangedBytesUnderARightHashDoNoHarm) {
   int refused = 0;
   for (const dna::Dna& dna : {face_with_everything(), face_that_learns()}) {
@@ -205,7 +205,7 @@ std::string refused_field(BlockBytes& changed) {
   return rig ? "taken" : rig.error().where;
 }
 
-// Rows that a LOD places without having computed them would be those of an earlier frame.
+// Rows that a LOD places without computing them would show an earlier frame.
 TEST(Block, RowsThatNothingComputesAreRefused) {
   const Rig rig = must_compile(face_with_everything());
   BlockBytes level = bytes_of(rig);
@@ -222,7 +222,7 @@ TEST(Block, RowsOfGroupsFollowEachOther) {
   EXPECT_EQ(refused_field(rows), "rig.joint_groups");
 }
 
-// Whole vectors are added to the rows of long groups: those of another must not be among them.
+// Whole vectors are added to the rows of wide groups, so no other group's rows may lie in them.
 TEST(Block, LongGroupsHaveWholeVectorsToThemselves) {
   constexpr std::uint16_t kLong = 18;
   std::vector<std::uint16_t> outputs(kLong);
@@ -254,7 +254,7 @@ TEST(Block, ColumnsByGroupStayInTheirMatrix) {
   EXPECT_EQ(refused_field(begin), "rig.joint_groups");
 }
 
-// A block that its group does not name would keep the attributes of the frame before.
+// A block outside of its group's range would keep the attributes of the frame before.
 TEST(Block, ChannelsAndRunsStayInWhatTheyCountIn) {
   dna::Dna dna = face_with_everything();
   dna.definition.blend_shape_channel_names = names("shape", 2);
@@ -290,7 +290,7 @@ TEST(Block, GroupsNameTheBlocksThatTheyWrite) {
   }
 }
 
-// They are looked up by their blocks.
+// Extra pieces are looked up by block.
 TEST(Block, ExtraPiecesOutOfOrderAreRefused) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups = std::vector{make_group({4, 4}, {0}, {2, 0, 22, 20}, {1, 2, 3, 4})};
@@ -317,7 +317,7 @@ TEST(Block, ChannelsOfARunFollowEachOther) {
   }
 }
 
-// Counts that no array backs: a small block must not ask for a large workspace.
+// Counts without an array behind them: a small block must not demand a large workspace.
 TEST(Block, ScratchIsHeldAgainstTheBlock) {
   const Rig rig = must_compile(face_with_everything());
   constexpr std::size_t kRigHeader = 32;  // behind magic, byte order, sizes and hash
@@ -328,7 +328,7 @@ TEST(Block, ScratchIsHeldAgainstTheBlock) {
   EXPECT_EQ(refused_field(forged), "rig.header");
 }
 
-// A network whose last layer has more rows than values are its own: the value behind is another's.
+// A network whose last layer has more rows than values of its own would overwrite another's values.
 TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
   const Rig rig = must_compile(face_that_learns());
   BlockBytes changed = bytes_of(rig);
@@ -337,7 +337,7 @@ TEST(Block, ANetworkWritesNoMoreThanItsOwnValues) {
   for (std::size_t i = 0; i < rig.ml_operations.size(); ++i) {
     MlOperation& operation = operations[i];
     if (operation.kind == MlOperation::kMlp && networks++ == 0) operation.value_count -= 1;
-    // All together are as many as the block says.
+    // The total equals the number in the header.
     if (operation.kind == MlOperation::kScatter && scatters++ == 0) {
       operation.values_begin = 0, operation.value_count = 1;
     }

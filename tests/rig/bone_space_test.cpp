@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kHalf = 0.70710678f;  // sine and cosine of 45 degrees
 
-// The file's y is up, the other space's z: x stays, y becomes z, z becomes -y; centimetres.
+// y is up in the file and z in the other space: x stays, y becomes z, z becomes -y; centimetres.
 SpaceConvention y_up() {
   SpaceConvention convention;
   convention.axes = {1, 0, 0, 0, 0, -1, 0, 1, 0};
@@ -58,7 +58,7 @@ TEST(BoneSpace, MirroredAxesTurnTheOtherWay) {
 TEST(BoneSpace, TheNeutralPoseIsTheRest) {
   const Channels out = channels_of(y_up(), {0, 90, 0}, {100, 0, 0, 0, 90, 0, 0, 0, 0}, {0});
   expect_near(out.rotation, {kHalf, 0, 0, kHalf});
-  expect_near(out.location, {0, -1, 0});  // x, seen from axes turned by 90 degrees about z
+  expect_near(out.location, {0, -1, 0});  // x, seen in axes that are turned by 90 degrees about z
 }
 
 TEST(BoneSpace, BonesMayBeSomeJointsInAnyOrder) {

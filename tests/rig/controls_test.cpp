@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The opt-in look at raw controls, and what a solver says of its poses.
+// The optional check of raw controls, and the explanation of a solver's poses.
 #include <gtest/gtest.h>
 
 #include <limits>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The semantics of each stage on faces small enough to be worked out by hand.
+// The semantics of each stage, on faces small enough to compute by hand.
 #include "rig/stages/evaluate.h"
 
 #include <algorithm>
@@ -59,8 +59,8 @@ TEST(EvaluateJoints, LastGroupThatWritesARowWins) {
   EXPECT_EQ(evaluate_once(rig, {1.0f, 1.0f}, 1).joints[4], 1.0f) << "no row at this LOD";
 }
 
-// Of four joints the first turns at both LODs, the second at the finer one, the third moves and the
-// fourth does nothing: each has a w, whatever was in memory.
+// Of four joints the first turns at both LODs, the second only at LOD 0, the third moves and the
+// fourth does nothing: each gets a w, whatever the memory held.
 TEST(EvaluateJoints, EveryQuaternionHasItsW) {
   dna::Dna dna = make_face(1, 0, 4);
   dna.behavior.joint_groups =
@@ -115,7 +115,7 @@ TEST(EvaluateJoints, NanStaysInTheGroupsThatHaveItAsAColumn) {
 
 // ---- correctives
 
-// Control 2 = corrective of 0 and 1 with the given entries.
+// Control 2 is a corrective of 0 and 1 with the given entries.
 Rig corrective_rig(std::vector<std::uint16_t> columns, std::vector<float> values) {
   dna::Dna dna = make_face(2, 1, 1);
   dna.behavior.psds.rows = std::vector<std::uint16_t>(columns.size(), 2);
@@ -145,14 +145,15 @@ TEST(EvaluateCorrectives, RawControlsKeepTheirUnclampedValue) {
 }
 
 TEST(EvaluateCorrectives, NanFactorSpoilsTheCorrective) {
-  const Rig rig = corrective_rig({0, 1}, {1, 1});  // whichever of the two watches it
+  const Rig rig = corrective_rig({0, 1}, {1, 1});  // independent of which factor watches it
   EXPECT_TRUE(std::isnan(evaluate_once(rig, {kNan, 1.0f}).controls[2]));
   EXPECT_TRUE(std::isnan(evaluate_once(rig, {1.0f, kNan}).controls[2]));
   EXPECT_EQ(evaluate_once(rig, {0.0f, kNan}).controls[2], 0.0f);
   EXPECT_EQ(evaluate_once(rig, {kNan, 0.0f}).controls[2], 0.0f);
 }
 
-// Correctives 1, 2, 3 of one raw control, each half of the one that it reads; entries interleaved.
+// Correctives 1, 2, 3 of one raw control, each half of the control that it reads; entries
+// interleaved.
 dna::Dna chain(std::vector<std::uint16_t> rows, std::vector<std::uint16_t> columns) {
   dna::Dna dna = make_face(1, 3, 1);
   dna.behavior.psds.values = std::vector<float>(rows.size(), 0.5f);
@@ -178,14 +179,15 @@ TEST(EvaluateCorrectives, FirstCallReadsNoCorrectiveEvenInTheOrderOfIndices) {
 TEST(EvaluateCorrectives, CycleStaysAtRest) {
   const Rig rig = must_compile(chain({1, 2, 3, 1}, {2, 1, 0, 0}));  // 1 reads 2 and raw, 2 reads 1
   EXPECT_EQ(evaluate_once(rig, {1.0f}).controls, (std::vector{1.0f, 0.0f, 0.0f, 0.5f}));
-  const Rig self = must_compile(chain({1, 2, 3}, {1, 1, 0}));  // 1 reads itself, 2 hangs on it
+  const Rig self = must_compile(chain({1, 2, 3}, {1, 1, 0}));  // 1 reads itself, 2 depends on it
   EXPECT_EQ(evaluate_once(self, {1.0f}).controls, (std::vector{1.0f, 0.0f, 0.0f, 0.5f}));
 }
 
 TEST(EvaluateCorrectives, CorrectiveThatNothingUsesAtTheLodStaysZero) {
   dna::Dna dna = chain({1, 2, 3}, {0, 0, 0});
   dna.behavior.joint_groups =
-      std::vector{make_group({2, 1}, {1, 2}, {0, 1}, {1, 0, 0, 1})};  // 3 unused, 2 at LOD 0 only
+      // 3 is unused, 2 is used at LOD 0 only.
+      std::vector{make_group({2, 1}, {1, 2}, {0, 1}, {1, 0, 0, 1})};
   const Rig rig = must_compile(dna);
   EXPECT_EQ(evaluate_once(rig, {1.0f}, 0).controls, (std::vector{1.0f, 0.5f, 0.5f, 0.0f}));
   EXPECT_EQ(evaluate_once(rig, {1.0f}, 1).controls, (std::vector{1.0f, 0.5f, 0.0f, 0.0f}));
@@ -278,7 +280,7 @@ TEST(EvaluateMaps, LodUsesLeadingRowsEvenInsideARun) {
   EXPECT_EQ(evaluate_once(rig, {0.25f}, 1).animated_maps[0], 0.25f);
 }
 
-// What is passed over while its input rests adds nothing: against the rows, one after the other.
+// A run that is skipped while its input rests adds nothing: compared with a loop over all rows.
 TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
   constexpr std::uint16_t kRaw = 40, kMaps = 7;
   constexpr std::size_t kRows = 300;
@@ -292,7 +294,8 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
   std::vector<std::uint16_t> inputs, outputs;
   std::vector<float> from, to, slope, cut;
   for (std::size_t i = 0; i < kRows; ++i) {
-    const bool same = i > 0 && random() % 2 == 0;  // as the row before, so of its run
+    // Same input and output as the row before, so in its run.
+    const bool same = i > 0 && random() % 2 == 0;
     inputs.push_back(same ? inputs.back() : static_cast<std::uint16_t>(random() % kRaw));
     outputs.push_back(same ? outputs.back() : static_cast<std::uint16_t>(random() % kMaps));
     from.push_back(number(-1, 1)), to.push_back(number(-1, 1));
@@ -308,7 +311,7 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
     for (const std::uint32_t lod : {0u, 1u}) {
       std::vector<float> sums(kMaps);
       const std::size_t count = lod == 0 ? kRows : kRows / 2 + 1;
-      bool found = false;  // a row of the run that counts
+      bool found = false;  // the row of the run that counts
       for (std::size_t i = 0; i < count; ++i) {
         const bool begins = i == 0 || inputs[i] != inputs[i - 1] || outputs[i] != outputs[i - 1];
         const float v = raw[inputs[i]];
@@ -332,7 +335,7 @@ TEST(EvaluateMaps, ManyRowsOfManyControlsAreTheirSumInOrder) {
 
 // ---- blend shapes
 
-// Whether controls name their channels or channels look at their controls.
+// Controls may list their channels, or channels may read their controls.
 TEST(EvaluateShapes, ChannelsFollowTheirControlsHoweverManyAreActive) {
   constexpr std::uint16_t kRaw = 64, kShapes = 150;
   std::mt19937 random(6);
@@ -374,7 +377,7 @@ TEST(EvaluateShapes, CopyTheirControlUnclampedAndTheLastWins) {
   EXPECT_EQ(evaluate_once(rig, {2.5f, -1.0f}, 1).blend_shapes, (std::vector{0.0f, 0.0f, 2.5f}));
 }
 
-// ---- faces with nothing in them
+// ---- empty faces
 
 TEST(EvaluateShapes, ARunOfChannelsIsCutByTheLodAndLeavesTheOthersZero) {
   dna::Dna dna = make_face(3, 0, 1);
@@ -403,7 +406,7 @@ TEST(Evaluate, EmptyFaceGivesAnEmptyPose) {
   EXPECT_TRUE(pose.controls.empty());
 }
 
-// Found by the evaluate and rig fuzz targets: a step from the null pointer of no joints.
+// Found by the evaluate and rig fuzz targets: pointer arithmetic on the null pointer of no joints.
 TEST(Evaluate, EmptyFaceHasNoQuaternions) {
   compile::CompileOptions options;
   options.rotation = compile::Rotation::kQuaternion;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A compiled face in a file, by whoever it was written.
+// A compiled face in a file, written by anybody.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -56,7 +56,7 @@ class RigFile : public testing::Test {
   core::Result<Rig> open(const path& file, Trust trust, ReadBy by = ReadBy::kCopy) {
     return open_rig_file(file, trust, by, simd::scalar_kernels());
   }
-  // What is refused names the file and a field.
+  // A refusal names the file and a field.
   void expect_refused(const Bytes& bytes, Trust trust, const std::string& where,
                       const std::string& words = "") {
     const path file = write(bytes);
@@ -71,7 +71,7 @@ class RigFile : public testing::Test {
     out[at] = value;
     return out;
   }
-  // A face that only the check of indices can tell from a good one.
+  // A face whose damage only the check of indices can find.
   Bytes with_wild_index() const {
     Bytes out = bytes_;
     const auto* factor = reinterpret_cast<const std::uint8_t*>(rig_->psd_factors.data());
@@ -131,7 +131,7 @@ TEST_F(RigFile, ABitOfEachFieldOfTheHeaderIsFound) {
   }
 }
 
-// Arrays begin on multiples of 64: every region of the block is met, and what lies between them.
+// Arrays begin on multiples of 64, so that every array and the gaps between them are hit.
 TEST_F(RigFile, AFlippedBitOfOnesOwnFileIsFound) {
   const path file = folder_ / "face.rig";
   for (std::size_t at = 0; at < bytes_.size(); at += 13) {
@@ -184,7 +184,7 @@ TEST_F(RigFile, AFolderThatIsNotThereCannotBeWritten) {
 
 constexpr uid_t kNobody = 65534;
 
-// Whose file it is decides: under a wild index only the full check refuses.
+// The owner of the file decides: only the full check refuses a wild index.
 TEST_F(RigFile, AFileThatOthersMayWriteGetsTheFullCheck) {
   const path file = write(with_wild_index());
   for (const ReadBy by : {ReadBy::kCopy, ReadBy::kMap}) {
@@ -204,7 +204,7 @@ TEST_F(RigFile, AFileOfAnotherUserGetsTheFullCheck) {
   if (::chown(file.c_str(), kNobody, static_cast<gid_t>(-1)) == 0) {
     EXPECT_FALSE(open(file, Trust::kOwner).has_value());
   } else {
-    // Only root may give files away; a system file is another user's as well.
+    // Only root may give files away, but a system file belongs to another user too.
     const auto other = bytes::read_file("/etc/passwd");
     ASSERT_TRUE(other.has_value());
     EXPECT_FALSE(other->is_own);
@@ -215,7 +215,7 @@ TEST_F(RigFile, AFileThatMayNotBeReadIsRefused) {
   const path file = write(bytes_);
   ::chmod(file.c_str(), 0);
   const bool root = ::geteuid() == 0;
-  if (root) {  // whom nothing is forbidden
+  if (root) {  // root may do everything
     ASSERT_EQ(::seteuid(kNobody), 0);
   }
   const auto rig = open(file, Trust::kCaller);

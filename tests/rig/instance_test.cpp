@@ -9,7 +9,7 @@ namespace {
 
 using namespace testing_support;
 
-// Corrective 1 is the raw control, corrective 2 is corrective 1.
+// Corrective 1 equals the raw control, corrective 2 equals corrective 1.
 Rig latency_rig() {
   dna::Dna dna = make_face(1, 2, 1);
   dna.behavior.psds.rows = {1, 2};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What a workspace keeps from one frame to the next is never seen: whatever it was used for before,
-// a pose has the bits of one from a workspace of its own.
+// State that a workspace keeps between frames is never visible: a pose has the same bits as one
+// from a fresh workspace.
 #include <array>
 #include <cstring>
 #include <random>
@@ -15,8 +15,8 @@ using namespace testing_support;
 
 constexpr std::size_t kInputs = 12, kCorrectives = 40, kBones = 30, kLevels = 3;
 
-// Of the first face few channels have a control: all of them look at theirs in most frames. Of the
-// second one many have.
+// Few channels of the first face have a control, so that in most frames every channel reads its
+// control. Many channels of the second face have one.
 void add_channels(dna::Dna& dna, std::uint32_t seed) {
   const std::size_t count = seed == 1 ? 20 : 150;
   dna.definition.blend_shape_channel_names = names("shape", count);
@@ -30,7 +30,7 @@ void add_channels(dna::Dna& dna, std::uint32_t seed) {
   dna.behavior.blend_shape_channels.output_indices = std::move(outputs);
 }
 
-// A map of each raw control in two runs; of every third one it shows something at rest.
+// A map of each raw control in two runs; every third one is not 0 at rest.
 void add_maps(dna::Dna& dna) {
   dna.definition.animated_map_names = names("map", kInputs);
   dna::Conditionals& table = dna.behavior.animated_maps.conditionals;
@@ -53,8 +53,8 @@ void add_maps(dna::Dna& dna) {
   table.cut_values = std::move(cut);
 }
 
-// Correctives of two to four raw controls, and groups that all controls drive; the numbers are by
-// chance, the sizes are not.
+// Correctives of two to four raw controls, and groups that all controls drive. The values are
+// random, the sizes are fixed.
 dna::Dna correcting_face(std::uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);
@@ -69,7 +69,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       columns.push_back(static_cast<std::uint16_t>((first + f * (1 + p % 2)) % kInputs));
     }
   }
-  // A factor below 0 turns the corrective: its product may be -0.
+  // A negative weight turns the corrective: its product may be -0.
   std::vector<float> weights(rows.size(), 1.25f);
   for (std::size_t i = 0; i < weights.size(); i += 5) weights[i] = -0.5f;
   psds.values = std::move(weights);
@@ -84,7 +84,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
       outputs[r] = static_cast<std::uint16_t>(static_cast<std::size_t>(first) + r);
     }
     std::vector<float> values(inputs.size() * outputs.size());
-    // A third of the columns is not kept, another one in each face.
+    // A third of the columns is empty, a different third in each face.
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = (i % inputs.size() + seed) % 3 == 0 ? 0.0f : value(random);
     }
@@ -97,7 +97,7 @@ dna::Dna correcting_face(std::uint32_t seed) {
   return dna;
 }
 
-// Frames that keep their active controls for a while, some of them below 0 or no number.
+// Frames that keep their active controls for a while, some of them negative or not finite.
 class Film {
  public:
   const std::vector<float>& next() {
@@ -118,7 +118,7 @@ class Film {
   std::vector<float> raw_ = std::vector<float>(kInputs);
 };
 
-// NaN is not equal to itself.
+// Compares bits, because NaN is not equal to itself.
 bool same_bits(std::span<const float> a, std::span<const float> b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size_bytes()) == 0;
 }
@@ -159,7 +159,7 @@ TEST(Kept, IsOfOneRigThoughAnotherTakesItsPlace) {
   Workspace work;
   std::vector<float> raw(kInputs, 0.5f);
   for (const std::uint32_t seed : {1u, 2u}) {
-    // The second one may well lie where the first one was.
+    // The second rig may lie at the address of the first.
     const Rig rig = must_compile(correcting_face(seed));
     if (seed == 1) work = make_workspace(rig);
     work.traversal = Traversal::kListed;

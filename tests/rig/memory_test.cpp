@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What opening a compiled rig, and a place to evaluate it in, take from the heap.
+// Heap memory of opening a compiled rig and of a workspace for it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,8 +27,8 @@ Copy copy(std::span<const std::uint8_t> block) {
   return {owner, {owner.get(), block.size()}};
 }
 
-// Far below what the check of a block allows one that is forged: what compile makes of these faces
-// has no more to evaluate than the block to list.
+// Far below the limit for a forged block, because compile makes no more to evaluate from these
+// faces than their blocks list.
 constexpr std::size_t kTimesTheBlock = 4, kBeside = 16 * 1024;
 
 class RigMemory : public testing::TestWithParam<Bomb> {};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Prints a hash of everything linear that the scalar path gives for generated rigs.
-// packaging/check/cross.sh compiles this and the evaluator in several ways and wants one hash.
+// Prints a hash of all linear results of the scalar path for generated rigs.
+// packaging/check/cross.sh compiles this program and the evaluator in several ways and demands one
+// hash.
 #include <cstdio>
 #include <cstring>
 
@@ -14,7 +15,7 @@ namespace {
 
 using namespace risorius;
 
-// Numbers that are the same everywhere: the standard's distributions are not.
+// Gives the same numbers everywhere, unlike the standard's distributions.
 class Numbers {
  public:
   explicit Numbers(std::uint64_t seed) : state_(seed * 2 + 1) {}
@@ -91,7 +92,7 @@ dna::JointGroup group(Numbers& numbers) {
   return g;
 }
 
-// Each of up to five factors: raw controls, and correctives before it.
+// Up to five factors each: raw controls, and correctives before it.
 dna::Psds correctives(Numbers& numbers) {
   std::vector<std::uint16_t> rows, columns;
   std::vector<float> values;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Bones and skin against a plain reference in double, under the instruction set of RISORIUS_SIMD.
+// Compares bones and skin with a plain reference in double, with the instruction set of
+// RISORIUS_SIMD.
 #include "rig/outputs/skin.h"
 
 #include <gtest/gtest.h>
@@ -31,7 +32,7 @@ Matrix product(const Matrix& a, const Matrix& b) {
   return out;
 }
 
-// By elimination with the largest pivot.
+// Gauss elimination with the largest pivot.
 Matrix inverse(Matrix m) {
   Matrix out = identity();
   for (std::size_t c = 0; c < 4; ++c) {
@@ -69,7 +70,7 @@ Matrix kept(const float* location, const float* rotation, const float* scale) {
   return m;
 }
 
-// A tree whose bones stand in any order, and what they keep.
+// A tree of bones in any order, and their transforms.
 struct Armature {
   std::vector<std::int32_t> parents;
   std::vector<double> rest;
@@ -83,7 +84,7 @@ struct Armature {
     return m;
   }
 
-  // As Blender words it: pose = pose of the parent * rest from there * kept.
+  // As in Blender: pose = pose of the parent * rest relative to the parent * transform.
   Matrix pose(std::size_t b) const {
     const Matrix own = kept(&location[b * 3], &rotation[b * 4], &scale[b * 3]);
     if (parents[b] < 0) return product(rest_of(b), own);
@@ -189,7 +190,7 @@ TEST(JointChain, WrongTreesAndMatricesAreErrors) {
 
 // ---- skin
 
-// Influences of vertices, some of them without any.
+// Influences of vertices; some vertices have none.
 struct Mesh {
   std::vector<std::uint32_t> offsets{0}, bones;
   std::vector<float> weights, points;
@@ -200,7 +201,7 @@ struct Mesh {
   }
 };
 
-// In: counts  of influences, one vertex after the other and again from the begin
+// In: counts  numbers of influences, used for the vertices in turn
 Mesh random_mesh(std::size_t vertices, std::span<const std::uint32_t> counts, std::uint32_t bones,
                  std::uint32_t seed) {
   std::mt19937 random(seed);
@@ -227,7 +228,7 @@ std::vector<float> evaluated(const simd::Kernels& kernels, const Mesh& mesh,
   return out;
 }
 
-// Blender's sentence in double: p + sum w (M p - p) / sum w, where sum w is above 0.0001.
+// Blender's formula in double: p + sum w (M p - p) / sum w, if sum w is above 0.0001.
 std::vector<double> reference(const Mesh& mesh, const std::vector<float>& matrices) {
   std::vector<double> out(mesh.points.begin(), mesh.points.end());
   for (std::size_t v = 0; v < mesh.size(); ++v) {
@@ -280,7 +281,7 @@ TEST(Skin, VerticesWithoutWeightStayToTheBit) {
   matrices[3] = matrices[15] = 2;  // both move by 2
   const std::vector<float> out = evaluated(kernels(), mesh, matrices);
   for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(out[i], mesh.points[i]);
-  EXPECT_NEAR(out[9], 2.0f, 1e-6f);  // however small the sum is that its weights are divided by
+  EXPECT_NEAR(out[9], 2.0f, 1e-6f);  // even if the sum of its weights is tiny
 }
 
 TEST(Skin, BonesAtRestChangeNoBit) {
@@ -296,7 +297,8 @@ TEST(Skin, WhatIsNotFiniteSpoilsTheVerticesOfItsBoneAlone) {
   const std::vector<std::uint32_t> counts{1, 2, 3, 5};
   Mesh mesh = random_mesh(500, counts, 50, 12);
   const std::vector<float> clean = evaluated(kernels(), mesh, matrices);
-  for (std::size_t i = 0; i < 12; ++i) matrices[i] = kNaN;  // of the bone that 0 stands for
+  // The matrix of the bone that pads groups as 0.
+  for (std::size_t i = 0; i < 12; ++i) matrices[i] = kNaN;
   mesh.points[0] = kNaN;
   const std::vector<float> out = evaluated(kernels(), mesh, matrices);
   for (std::size_t v = 0; v < mesh.size(); ++v) {

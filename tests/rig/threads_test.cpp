@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One Rig under eight threads gives each what it gives one alone. Preset `tsan` looks at the same
-// tests with the thread sanitizer.
+// One Rig in eight threads gives each thread the same poses as alone. The preset `tsan` runs the
+// same tests with the thread sanitizer.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -21,7 +21,7 @@ using compile::CompileOptions;
 
 constexpr std::size_t kThreads = 8, kTurns = 40, kFramesEach = 11;
 
-// Two ways: linear and halves, quaternions and float32.
+// Two variants: linear with float16, quaternions with float32.
 std::vector<CompileOptions> ways() {
   CompileOptions halves, quaternions;
   halves.precision = compile::Precision::kFloat16;
@@ -48,7 +48,7 @@ bool same(const Pose& a, const Pose& b) {
          a.animated_maps == b.animated_maps && a.controls == b.controls;
 }
 
-// Runs body(thread) on all threads, which begin together.
+// Runs body(thread) in all threads, which start together.
 template <class Body>
 void together(const Body& body) {
   std::atomic<std::size_t> waiting{kThreads};
@@ -87,7 +87,7 @@ TEST(OneRig, GivesEveryWorkspaceWhatItGivesOneAlone) {
 TEST(OneRig, GivesEveryInstanceItsOwnPast) {
   for (const CompileOptions& way : ways()) {
     const Rig rig = full_rig(way);
-    // The last pose of a face that saw the frames from `first` on, alone and among others.
+    // The last pose of a face that saw the frames from `first` on, alone and beside others.
     const auto film = [&rig](std::size_t first) {
       Instance face(rig);
       face.set_mask(0, static_cast<float>(first % 2));
@@ -160,7 +160,7 @@ TEST(OneRig, SealsItsBlockOnceWhoeverAsksFirst) {
   EXPECT_EQ(rig.block().data(), Rig(rig).block().data());
 }
 
-// A face of make_full_face with a mesh of many blocks.
+// A face of make_full_face and a mesh with many blocks.
 FaceParts many_blocks(const Rig& rig) {
   constexpr std::uint32_t kVertices = 5 * kSkinBlock + 7;
   FaceParts parts;
@@ -192,7 +192,7 @@ FaceParts many_blocks(const Rig& rig) {
 
 TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
   const Rig rig = full_rig({});
-  std::vector<std::vector<std::vector<float>>> all;  // of each number of threads, the meshes
+  std::vector<std::vector<std::vector<float>>> all;  // for each number of threads, the meshes
   for (const std::size_t threads : {1u, 2u, 5u, 8u}) {
     std::vector<std::unique_ptr<DirectFace>> faces;
     std::vector<DirectFace*> pointers;
@@ -215,10 +215,10 @@ TEST(OneRig, GivesFacesInAnyNumberOfThreadsTheVerticesOfEachAlone) {
     all.push_back(out);
   }
   for (const auto& out : all) EXPECT_EQ(out, all[0]);
-  EXPECT_NE(all[0][0], all[0][2]);  // of another frame
+  EXPECT_NE(all[0][0], all[0][2]);  // a different frame
 }
 
-// Not of the tsan preset's OneRig: exceptions pass between threads.
+// Not in the tsan preset's OneRig, because exceptions pass between threads.
 TEST(Parallel, WhatAThreadThrowsIsTheCallers) {
   std::atomic<std::size_t> done = 0;
   const auto body = [&](std::size_t begin, std::size_t end) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The ways through the columns of the joint groups: those of active controls, which are listed or
-// added one by one, and all of them.
+// The orders in which columns of the joint groups are visited: only those of active controls,
+// listed or added one by one, or all of them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,8 +17,8 @@ using namespace testing_support;
 
 constexpr std::size_t kRaw = 24, kJoints = 40;
 
-// Groups of one row to many vectors, at every LOD fewer rows; some write each other's attributes,
-// and between them are attributes that none writes.
+// Groups of one row to many vectors, with fewer rows at each LOD. Some write the same attributes,
+// and some attributes between them have no row.
 dna::Dna many_groups() {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> value(-2.0f, 2.0f);
@@ -53,7 +53,7 @@ std::vector<float> some_active(std::size_t n, std::uint32_t seed) {
   return raw;
 }
 
-// What a row is, by the file's own matrix in doubles, and how far a sum may be from it.
+// The exact value of a row by the file's own matrix in double, and the largest error of a sum.
 struct Expected {
   double value = 0, bound = 0;
 };
@@ -78,7 +78,7 @@ std::vector<Expected> expected(const dna::Dna& dna, const std::vector<float>& ra
 Pose evaluate_by(const Rig& rig, Workspace& work, Traversal traversal,
                  const std::vector<float>& raw, std::uint32_t lod) {
   Pose pose = make_pose(rig);
-  std::ranges::fill(pose.joints, kNan);  // whatever was there
+  std::ranges::fill(pose.joints, kNan);  // old content of the memory
   work.traversal = traversal;
   evaluate(rig, raw.data(), lod, true, work, pose);
   return pose;
@@ -92,7 +92,7 @@ class Traversals : public testing::TestWithParam<std::string> {
 
 TEST_P(Traversals, GiveTheSumsOfTheFile) {
   const Rig rig = must_compile(dna_, kernels_);
-  Workspace work = make_workspace(rig);  // one for all frames: nothing of a frame stays
+  Workspace work = make_workspace(rig);  // one for all frames: no state of a frame may remain
   std::size_t whole = 0;
   for (const std::size_t active : {kRaw, std::size_t{0}, std::size_t{1}, std::size_t{9}, kRaw}) {
     for (std::uint32_t lod = 0; lod < 3; ++lod) {
@@ -161,7 +161,7 @@ TEST_P(Traversals, OfABatchGiveTheBitsOfTheFrameAlone) {
   }
 }
 
-// A group that rests beside one that moves must not show what it was in the frame before.
+// A resting group beside a moving one must not show the frame before.
 TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Workspace work = make_batch_workspace(rig), fresh = make_workspace(rig);
@@ -189,7 +189,7 @@ TEST_P(Traversals, LeaveNothingOfTheFrameBefore) {
   }
 }
 
-// An Instance fills only what the frame before wrote.
+// An Instance clears only the blocks that the frame before wrote.
 TEST_P(Traversals, OfAnInstanceLeaveNothingOfTheFrameBefore) {
   const Rig rig = must_compile(dna_, kernels_);
   Instance face(rig);
@@ -229,12 +229,13 @@ TEST_P(Traversals, KeepNanInTheGroupsThatHaveItAsAColumn) {
   EXPECT_EQ(evaluate_by(rig, work, Traversal::kAdded, raw, 0).joints, clean.joints);
 }
 
-// The last block of attributes is cut short where joints end; it may take several pieces.
+// The last block of attributes is incomplete at the end of the joints; it may need several pieces.
 TEST_P(Traversals, FillTheLastBlockAndNothingBehindIt) {
   for (std::uint16_t joints = 1; joints < 4; ++joints) {
     const auto places = static_cast<std::uint16_t>(joints * 9);
     dna::Dna dna = make_face(2, 0, joints, 1);
-    std::vector<std::uint16_t> outputs;  // backwards: each row is a piece of its own
+    // In descending order, so that each row is a piece of its own.
+    std::vector<std::uint16_t> outputs;
     std::vector<float> values, expected(places);
     for (std::uint16_t p = places; p-- > 0;) {
       outputs.push_back(p);
@@ -272,8 +273,9 @@ INSTANTIATE_TEST_SUITE_P(Every, Traversals, testing::ValuesIn([] {
                          [](const auto& about) { return about.param; });
 
 TEST(Traversal, IsChosenByTheBytesThatItMoves) {
-  // Columns of 90 rows, 360 bytes: listing one moves 32. With 11 of 12 active the last one's bytes
-  // and the list of all, 360 + 12 * 8, are more than 11 * 32; of columns of two rows they are less.
+  // Columns of 90 rows have 360 bytes; listing one moves 32. With 11 of 12 controls active, the
+  // bytes of the last column and the list of all, 360 + 12 * 8, exceed 11 * 32; with columns of two
+  // rows they do not.
   for (const auto& [rows, eleven] :
        {std::pair{std::uint16_t{90}, 0u}, std::pair{std::uint16_t{2}, 1u}}) {
     dna::Dna dna = make_face(12, 0, 10, 1);
@@ -296,7 +298,7 @@ TEST(Traversal, IsChosenByTheBytesThatItMoves) {
   }
 }
 
-// Those of fewer active columns a group than the kernels say.
+// Controls are added if each group has fewer active columns than the kernels' limit.
 TEST(Traversal, AddsTheColumnsOfFewControls) {
   constexpr std::uint16_t kControls = 80, kColumnRows = 90;
   dna::Dna dna = make_face(kControls, 0, 10, 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every instruction set against a sum in double precision, at the sizes where loops begin and end.
+// Compares every instruction set with sums in double, at sizes around the ends of loops.
 #include "simd/kernels.h"
 
 #include <gtest/gtest.h>
@@ -77,8 +77,8 @@ std::vector<std::string> all_kernels() {
 double value(float v) { return v; }
 double value(std::uint16_t v) { return from_half(v); }
 
-// A sum of n products, rounded in any order, fused or not, errs by at most n * eps * sum|w v| to
-// first order; one more eps covers the second order at these n.
+// The error of a sum of n products, rounded in any order, fused or not, is at most n * eps * sum|w
+// v| to first order; one more eps covers the second order at these n.
 template <class T>
 void expect_sums(const Matrix<T>& m, const std::vector<std::uint32_t>& offsets,
                  const float* weights, std::size_t step, std::size_t n, const float* out) {
@@ -132,7 +132,7 @@ TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
     const Matrix<std::uint16_t> half = halves(m);
     const std::vector<float> weights = random_weights(kCount, random);
     const std::vector<Column> columns = columns_of(every_second(kCount, rows), kCount);
-    // The second of three runs; the others are of rows that nothing is added to.
+    // The second of three runs; nothing is added to the others.
     const std::size_t first = rounded_up(rows), end = first + rows;
     const Rows runs[] = {{0, 1},
                          {static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(rows)}};
@@ -161,7 +161,7 @@ TEST_P(SimdKernels, AddColumnsToTheBitsOfTheirSums) {
   }
 }
 
-// A coarse LOD has none of the last groups: their runs are not known, and may be anywhere.
+// A coarse LOD has none of the last groups: their runs are unknown and may be anywhere.
 TEST_P(SimdKernels, AddNoColumnOfAGroupWithoutRows) {
   constexpr std::uint32_t kRowCount = 16;
   std::mt19937 random(13);
@@ -323,7 +323,7 @@ TEST_P(SimdKernels, PlaceMoreWithoutChangingOtherPlaces) {
   for (int i = 0; i < 200; ++i) {
     const auto mask = static_cast<std::uint16_t>(random() % 0x10000);
     const Piece piece{static_cast<std::uint32_t>(random() % 400), mask, 2};
-    std::vector<float> to(3 * kPlaces), expected;  // no place behind the block
+    std::vector<float> to(3 * kPlaces), expected;  // no place behind the block is written
     for (std::size_t p = 0; p < to.size(); ++p) to[p] = -static_cast<float>(p + 1);
     expected = to;
     std::uint32_t next = piece.from;
@@ -335,7 +335,7 @@ TEST_P(SimdKernels, PlaceMoreWithoutChangingOtherPlaces) {
   }
 }
 
-// Frames lie apart, and what is between them is another's.
+// Frames have gaps between them, which belong to something else.
 TEST_P(SimdKernels, PlaceEachFrameAsIfItWereAlone) {
   constexpr std::size_t kCount = 5, kPieces = 40, kRowStride = 700, kStride = kPieces * kPlaces + 3;
   std::mt19937 random(10);
@@ -385,7 +385,7 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   std::mt19937 random(10);
   for (std::size_t t = 0; t < 2 * std::size(turns); ++t) {
     const Turn& turn = turns[t / 2];
-    // Large angles, and those that need no reduction.
+    // Large angles, and angles that need no reduction.
     const float most = t % 2 == 0 ? 20.0f : 1.55f;
     std::uniform_real_distribution<float> angle(-most, most);
     for (const std::size_t count : {0u, 1u, 15u, 16u, 17u, 40u}) {
@@ -418,8 +418,8 @@ TEST_P(SimdKernels, TurnEulerAnglesIntoQuaternions) {
   }
 }
 
-// Those that turn share a pass with others than their neighbours, large angles with small ones, and
-// each has the bits of one alone.
+// Rotations that turn are computed together with any others, large angles with small ones, and each
+// has the bits of a single one.
 TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
   constexpr std::size_t kCount = 700, kStride = 10;
   std::mt19937 random(12);
@@ -431,9 +431,9 @@ TEST_P(SimdKernels, TurnRotationsTogetherAsAlone) {
       for (std::size_t i = 0; i < kCount; ++i) {
         which[i] = static_cast<std::uint16_t>(i);
         if (i % one_in == 1 % one_in) rotations[i * kStride + i % 3] = angle(random);
-        rotations[i * kStride + 3] = 7.0f;  // what was in memory
+        rotations[i * kStride + 3] = 7.0f;  // old content of the memory
       }
-      rotations[5 * kStride] = -0.0f;  // turns, by nothing
+      rotations[5 * kStride] = -0.0f;  // counts as turning, by nothing
       const std::vector<float> angles = rotations;
       std::vector<float> alone = rotations;
       kernels_.quaternions({}, which.data(), kCount, rotations.data(), kStride);

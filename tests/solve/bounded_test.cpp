@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Least squares between bounds: a strictly convex problem has one answer, and the conditions of
-// Karush, Kuhn and Tucker tell whether one has it.
+// Least squares with bounds: a strictly convex problem has one solution, and the conditions of
+// Karush, Kuhn and Tucker identify it.
 #include "solve/bounded.h"
 
 #include <gtest/gtest.h>
@@ -21,8 +21,8 @@ Doubles random(std::mt19937& random, std::size_t n, double low, double high) {
   return out;
 }
 
-/// How far x is from the conditions, beside the size of the slopes.
-/// In: slope  of what is to be least; kink  what may be added to it on either side at rest
+/// How far x violates the conditions, relative to the size of the slopes.
+/// In: slope  gradient of the smooth part; kink  of the sparse part, added on either side of rest
 double violation(const Doubles& x, const Doubles& slope, const Doubles& low, const Doubles& high,
                  const Doubles& rest, const Doubles& kink) {
   double worst = 0.0;
@@ -32,7 +32,7 @@ double violation(const Doubles& x, const Doubles& slope, const Doubles& low, con
     double down = slope[i] - kink[i], up = slope[i] + kink[i];  // slopes to the left and right
     if (x[i] > rest[i]) down = up;
     if (x[i] < rest[i]) up = down;
-    if (x[i] < high[i]) worst = std::max(worst, -up);  // more of it would be better
+    if (x[i] < high[i]) worst = std::max(worst, -up);  // a larger value would be better
     if (x[i] > low[i]) worst = std::max(worst, down);
   }
   return worst;
@@ -59,7 +59,7 @@ TEST(LeastChange, MeetsTheConditionsOfTheLeast) {
   for (int i = 0; i < 60; ++i) {
     const std::size_t rows = 1 + static_cast<std::size_t>(i) % 9, columns = 40;
     const Doubles a = random(numbers, rows * columns, -1, 1);
-    // Half of them cannot be reached.
+    // Half of the targets cannot be reached.
     const Doubles b = random(numbers, rows, -1, 1.0 + 20.0 * (i % 2));
     const Doubles low = random(numbers, columns, -0.4, 0), high = random(numbers, columns, 0, 0.4);
     const double ridge = i % 3 == 0 ? 1.0 : 1e-6;
@@ -86,7 +86,7 @@ TEST(Descend, MeetsTheConditionsOfTheLeast) {
   std::mt19937 numbers(11);
   constexpr std::size_t kCount = 30;
   for (int i = 0; i < 40; ++i) {
-    // Columns that are much alike, as of a jaw and its extreme.
+    // Nearly equal columns, like a jaw and its extreme.
     Doubles a = random(numbers, 50 * kCount, -1, 1);
     for (std::size_t r = 0; r < 50; ++r)
       a[r * kCount + 1] = a[r * kCount] + 0.01 * a[r * kCount + 1];
@@ -123,7 +123,7 @@ TEST(Descend, ComesNearTheLeastWhereControlsDoNearlyTheSame) {
         h[j] += a[r * kCount + j / kCount] * a[r * kCount + j % kCount];
       }
     }
-    const Doubles goal = random(numbers, kCount, -1.5, 1.5);  // often beyond the bounds
+    const Doubles goal = random(numbers, kCount, -1.5, 1.5);  // often outside of the bounds
     const Doubles low = random(numbers, kCount, -1, -0.2), high = random(numbers, kCount, 0.2, 1);
     for (std::size_t j = 0; j < kCount * kCount; ++j) g[j / kCount] += h[j] * goal[j % kCount];
     const Doubles rest(kCount, 0.0), sparse(kCount, i % 2 == 0 ? 1e-4 : 0.0);
@@ -143,7 +143,7 @@ TEST(Descend, LeavesAtRestWhatIsNotWorthItsPrice) {
   Doubles x{0.3, 0.3};
   descend({2, h.data(), g.data(), low.data(), high.data(), rest.data(), sparse.data()}, 1e-9,
           x.data());
-  EXPECT_EQ(x[0], 0.0);          // |g| is below the price
+  EXPECT_EQ(x[0], 0.0);          // |g| is below the sparse weight
   EXPECT_NEAR(x[1], 0.4, 1e-9);  // (1 - 0.2) / 2
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A face without behavior, for tests and for programs that are none.
+// A face without behavior, for tests and other programs.
 #pragma once
 
 #include <string>

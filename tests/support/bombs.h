@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Small faces whose lists multiply each other in a careless reader. Their files grow with n, what
-// they would unfold to with its square.
+// Small faces whose lists multiply each other in a careless reader. A file's size grows with n, the
+// work of such a reader with n * n.
 #pragma once
 
 #include "rig/arrays.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Clips of the tests, and what the codec promises about any bytes.
+// Clips for tests, and the promises of the codec about any bytes.
 #pragma once
 
 #include <bit>
@@ -36,8 +36,9 @@ inline clip::Clip make_clip(std::size_t controls, std::size_t frames) {
   return clip;
 }
 
-/// One control of each kind that the codec tells apart, by exact arithmetic: 0 at rest, 1 constant,
-/// 2 a line, 3 a polynomial, 4 held steps, 5 as 3, 6 any bits, 7 NaN payloads, -0 and denormals.
+/// One control of each kind that the codec distinguishes, by exact arithmetic: 0 at rest, 1
+/// constant, 2 a line, 3 a polynomial, 4 held steps, 5 like 3, 6 any bits, 7 NaN payloads, -0 and
+/// denormals.
 inline clip::Clip make_all_kinds(std::size_t frames) {
   clip::Clip clip = make_clip(8, frames);
   std::mt19937 random(7);
@@ -54,7 +55,7 @@ inline clip::Clip make_all_kinds(std::size_t frames) {
   return clip;
 }
 
-/// A clip with everything that a head, a block and an index can hold.
+/// A clip that uses every field of a head, a block and an index.
 inline clip::Clip make_full_clip(std::size_t frames) {
   clip::Clip clip = make_all_kinds(frames);
   clip.head.rate = 59.94;
@@ -68,7 +69,7 @@ inline clip::Clip make_full_clip(std::size_t frames) {
   return clip;
 }
 
-/// Puts the checksums of damaged bytes right, as far as their parts can be found.
+/// Corrects the checksums of damaged bytes, if their parts can be found.
 inline void seal(Bytes& bytes) {
   const auto number = [&](std::size_t at) {
     std::uint32_t value = 0;
@@ -96,8 +97,9 @@ inline void seal(Bytes& bytes) {
   put_hash(at, bytes.size() - clip::kHashSize, bytes.size() - clip::kHashSize);
 }
 
-/// The promise of the codec about bytes that was broken, or an empty text: a clip that is written
-/// and read again as it was, or a sentence with a part and an offset inside the file.
+/// The broken promise of the codec about bytes, or an empty text. The bytes must be a clip that can
+/// be written and read again without a change, or give a sentence with a part and an offset inside
+/// the file.
 inline std::string reading_clip(View bytes, clip::Ends ends) {
   clip::Limits limits;
   limits.values = 1u << 15;
@@ -118,7 +120,7 @@ inline std::string reading_clip(View bytes, clip::Ends ends) {
   return is_same ? "" : "written and read again a clip is another";
 }
 
-/// The same of the bytes of a block's curves.
+/// The same for the bytes of a block's curves.
 inline std::string reading_curves(View bytes, std::size_t controls, std::size_t frames) {
   const auto curves = clip::EncodedCurves::open(bytes, controls, frames);
   if (!curves) return curves.error().message.empty() ? "an error that says nothing" : "";
@@ -136,7 +138,7 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
   return "";
 }
 
-/// Any bits come back, and take hardly more space than they do.
+/// Any bits are preserved and take hardly more space.
 inline std::string keeping_bits(View bytes, std::size_t controls) {
   const std::size_t frames =
       std::min<std::size_t>(bytes.size() / 4 / controls, clip::kMostBlockFrames);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Counts every operator new of the executable. To be included by one of its files.
+// Counts every operator new of the executable. Include it in exactly one file.
 #pragma once
 
 #include <atomic>
@@ -28,7 +28,7 @@ void operator delete(void* p, std::size_t) noexcept { std::free(p); }
 void operator delete[](void* p, std::size_t) noexcept { std::free(p); }
 void operator delete(void* p, const std::nothrow_t&) noexcept { std::free(p); }
 
-#ifndef _WIN32  // there aligned memory has a release of its own; its allocations are not counted
+#ifndef _WIN32  // on Windows aligned memory has its own release; its allocations are not counted
 void* operator new(std::size_t bytes, std::align_val_t alignment) {
   ++allocations;
   const auto a = static_cast<std::size_t>(alignment);

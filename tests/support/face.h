@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Small faces made in memory, and the shortest way to evaluate them.
+// Small faces made in memory, and short ways to evaluate them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +29,8 @@ inline dna::JointGroup make_group(std::vector<std::uint16_t> lods,
   return g;
 }
 
-/// A group whose row r passes control inputs[r] to attribute r: shows controls, and uses them.
+/// A group whose row r copies control inputs[r] to attribute r, which makes controls visible and
+/// used.
 inline dna::JointGroup make_probe(const std::vector<std::uint16_t>& inputs, std::size_t lods = 2) {
   const std::size_t n = inputs.size();
   std::vector<std::uint16_t> outputs(n);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A head with something in every layer, and files of it: big enough that what is read and what is
-// passed over can be told apart.
+// A head with content in every layer, and files of it, large enough to distinguish read from
+// skipped bytes.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -17,8 +17,8 @@ namespace risorius::testing_support {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Sizes of a head; LOD l has a mesh of vertices >> l and channels >> l channels. The last mesh
-/// belongs to every LOD and has targets of all channels.
+/// Sizes of a head. LOD l has a mesh of vertices >> l and channels >> l channels. The last mesh
+/// belongs to every LOD and has targets for all channels.
 struct HeadSizes {
   std::uint16_t lods = 4, joints = 60, raw = 100, channels = 32;
   std::uint32_t vertices = 6000, deltas = 1500, joint_groups = 8;
@@ -26,7 +26,7 @@ struct HeadSizes {
   std::size_t unknown_bytes = 5000;
 };
 
-/// As small as a head with something in every list can be.
+/// The smallest head with content in every list.
 inline HeadSizes tiny_head() {
   return {.lods = 2,
           .joints = 3,
@@ -61,7 +61,7 @@ inline dna::LodMapping halving(std::uint16_t lods, std::size_t n) {
   return mapping;
 }
 
-/// LOD l lists l alone, and `always` if there is one.
+/// LOD l lists only l, and `always` unless it is -1.
 inline dna::LodMapping one_each(std::uint16_t lods, int always = -1) {
   dna::LodMapping mapping;
   mapping.lods = numbers(lods);
@@ -83,7 +83,7 @@ inline dna::BlendShapeTarget make_target(std::uint16_t channel, std::uint32_t de
   return t;
 }
 
-/// Quads over all vertices; every vertex hangs on the first three to six joints of `joints`.
+/// Quads over all vertices; every vertex has the first three to six joints of `joints`.
 inline dna::Mesh make_head_mesh(std::uint32_t vertices, std::uint16_t joints,
                                 std::uint16_t channels, std::uint32_t deltas) {
   dna::Mesh m;
@@ -175,7 +175,7 @@ inline void add_geometry(const HeadSizes& s, dna::Dna& dna) {
   dna.geometry.meshes = std::move(meshes);
 }
 
-// One network a LOD, each run by an operation as well.
+// One network per LOD; operations run them as well.
 inline void add_networks(const HeadSizes& s, dna::Dna& dna) {
   dna::MachineLearnedBehavior& ml = dna.machine_learned_behavior;
   ml.ml_control_names = names("ml", s.network_outputs);

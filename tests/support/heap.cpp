@@ -27,7 +27,7 @@ void* added(void* p) {
   return p;
 }
 
-// glibc's mark in front of a block that is its own mapping.
+// A flag of glibc in front of a block that has a mapping of its own.
 bool is_mapped(void* p) { return (static_cast<std::size_t*>(p)[-1] & 2) != 0; }
 
 }  // namespace

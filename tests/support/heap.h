@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a piece of code takes from the heap. Only with glibc and without a sanitizer: see
+// Counts the heap memory of a piece of code. Works only with glibc and without a sanitizer: see
 // tests/support/CMakeLists.txt.
 #pragma once
 
@@ -7,8 +7,8 @@
 
 namespace risorius::testing_support {
 
-/// Counts from its construction on: every malloc of this executable, operator new included. A
-/// block that realloc has to copy counts twice for that moment; pages that the kernel moves do not.
+/// Counts every malloc of this executable from its construction on, operator new included. A block
+/// that realloc copies counts twice during the copy; pages that the kernel moves do not.
 class HeapCount {
  public:
   HeapCount();

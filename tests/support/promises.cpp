@@ -42,7 +42,7 @@ std::string broken(const std::string& promise, const core::Error& error) {
 
 // ---- sources that are not memory
 
-// A file as parse sees it: piece by piece. From the given read on, every byte is another one.
+// A file as the parser sees it: piece by piece. From the given read on, every byte is different.
 class PieceSource final : public bytes::Source {
  public:
   PieceSource(View bytes, std::size_t honest_reads) : bytes_(bytes), honest_(honest_reads) {}
@@ -120,7 +120,7 @@ bool has_moderate_networks(const Dna& dna) {
       for (const auto* list : {&l.biases, &l.weights, &l.activation_parameters}) widen(most, *list);
     }
   }
-  constexpr std::uint16_t kWeightedSum = 4;  // its weights are bits of floats
+  constexpr std::uint16_t kWeightedSum = 4;  // its weights are the bits of floats
   for (const dna::MlType& type : dna.machine_learned_behavior_ext.types) {
     for (const auto& set : type.operations) {
       for (const auto& op : set) layers += op.operation_type == kWeightedSum ? 5 : 0;
@@ -144,7 +144,7 @@ bool has_moderate_solvers(const Dna& dna) {
   return most <= 1000 && factors <= 4;
 }
 
-// Weights of one corrective multiply each other: beyond 1 they may overflow.
+// The weights of one corrective multiply each other: above 1 they may overflow.
 bool is_moderate(const Dna& dna) {
   float weights = 0, rows = 0;
   widen(weights, dna.behavior.psds.values);
@@ -167,7 +167,7 @@ bool all_finite(const rig::Pose& p) {
          all_finite(p.controls);
 }
 
-// The same bits, or both no number.
+// The same bits, or both NaN.
 bool same(const float* a, const std::vector<float>& b) {
   for (std::size_t i = 0; i < b.size(); ++i) {
     const bool equal = std::bit_cast<std::uint32_t>(a[i]) == std::bit_cast<std::uint32_t>(b[i]);
@@ -182,8 +182,7 @@ bool same(const rig::Pose& a, const rig::Pose& b) {
 }
 
 // n products of a value and a control, each sum rounded once: 2 n eps * sum |value * control|
-// bounds what another order or a fused operation can change. Controls are below 2 where this is
-// asked.
+// bounds the effect of another order or a fused operation. Controls are below 2 here.
 float joint_tolerance(const Dna& dna, const rig::Rig& rig) {
   const float n = static_cast<float>(rig.control_count) + 1;
   constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
@@ -201,11 +200,11 @@ rig::Pose pose_of(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return pose;
 }
 
-// A compiled rig gives the same pose every way. A forged one need only be safe: its steps may read
-// what no step wrote, which an earlier frame then left there.
+// A compiled rig gives the same pose every way. A forged rig only needs to be safe: its steps may
+// read values that no step wrote in this frame.
 enum class Origin { kCompiled, kForged };
 
-// Frame n of a batch against the frame alone, the last one with other controls.
+// Compares frame n of a batch with the frame alone; the last frame has other controls.
 std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, bool settle,
                   Origin origin) {
   constexpr std::size_t kCount = simd::kFrames + 3;
@@ -234,8 +233,8 @@ std::string batch(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, b
   return kKept;
 }
 
-// All columns or those of active controls: one pose. A product too small for a float may leave a
-// sum at -0, which a column at rest makes 0.
+// Visiting all columns or only those of active controls gives one pose. A product below the float
+// range may leave a sum at -0, which a column at rest makes 0.
 std::string traversals(const rig::Rig& rig, const Controls& raw, std::uint32_t lod, Origin origin) {
   rig::Workspace work = rig::make_workspace(rig);
   rig::Pose listed = rig::make_pose(rig), whole = listed, added = listed;
@@ -266,7 +265,7 @@ std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod
   return kKept;
 }
 
-// Every way of evaluating, at every LOD. Out: the settled poses.
+// Evaluates every way at every LOD. Out: poses  the settled ones
 std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<rig::Pose>& poses,
                          Origin origin = Origin::kCompiled) {
   for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {
@@ -279,7 +278,7 @@ std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<r
   return kKept;
 }
 
-// A Rig's bytes are a Rig for others as well.
+// The bytes of a Rig can be opened as a Rig.
 std::string reopened(const rig::Rig& rig, const Controls& raw, const rig::Pose& expected) {
   const auto owner = core::allocate_pages(rig.block().size());
   std::ranges::copy(rig.block(), owner.get());
@@ -305,7 +304,7 @@ std::string evaluate_on(const Dna& dna, const compile::CompileOptions& options, 
   return kKept;
 }
 
-// Scalar, and one of the others that this CPU has.
+// Scalar, and one other instruction set of this CPU.
 std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   std::vector<const simd::Kernels*> others;
   for (const char* name : {"sse4", "avx2", "avx512", "neon"}) {
@@ -315,7 +314,7 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   return {&simd::scalar_kernels(), others[choice % others.size()]};
 }
 
-// Where a control's last bits differ a table may take another row: only equal controls compare.
+// If the last bits of a control differ, a table may take another row: only equal controls compare.
 std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
   const float tolerance = joint_tolerance(dna, a.rig);
   const bool exact = std::string_view(b.rig.kernels->name) == "sse4";
@@ -417,7 +416,7 @@ Result<Dna> parse_as(View bytes, const Filter& f, std::size_t honest_reads) {
   return dna::parse(source, f.options);
 }
 
-// What parse leaves out, left out afterwards.
+// Removes afterwards the layers that the options of parse leave out.
 Dna without_layers(Dna dna, const ParseOptions& o) {
   const dna::ControlCounts controls = dna::control_counts(dna);
   const bool uncounted = !o.definition;
@@ -449,14 +448,14 @@ Dna without_layers(Dna dna, const ParseOptions& o) {
   return dna;
 }
 
-// Layers that need one that is left out are the caller's mistake: nothing is promised but safety.
+// Layers without the layer that they need are the caller's mistake: only safety is promised.
 bool is_comparable(const ParseOptions& o) {
   const bool some = o.behavior || o.geometry || o.machine_learned_behavior || o.rbf_behavior ||
                     o.joint_behavior_metadata || o.twist_swing_behavior;
   return (o.definition || !some) && (o.behavior || !o.rbf_behavior);
 }
 
-// Networks, poses and setups that need controls which were not loaded make no file.
+// Networks, poses and setups that need unloaded controls cannot be written.
 bool lacks_controls(const Dna& dna, const core::Error& error) {
   return error.code == ErrorCode::kInvalidArgument &&
          !(dna.unread_controls == dna::UnreadControls{});
@@ -473,7 +472,7 @@ std::string compare_filtered(const Dna& full, const ParseOptions& o, const Resul
     return broken("a filtered load fails as the filter does", expected.error());
   }
   if (!filtered) return broken("a part of a file that is good is good", filtered.error());
-  // As JSON: writing closes the gaps of controls that were not loaded.
+  // As JSON: writing closes the gaps of unloaded controls.
   const Result<std::string> a = dna::to_json(*expected), b = dna::to_json(*filtered);
   if (!a) return broken("what was filtered is whole", a.error());
   if (!b) return broken("what was loaded filtered is whole", b.error());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the native code promises about any bytes, in functions that the fuzz targets and the tests
-// of hostile files share. Each gives the promise that was broken, or an empty text.
+// Promises of the native code about any bytes, as functions that fuzz targets and tests of hostile
+// files share. Each returns the broken promise, or an empty text.
 #pragma once
 
 #include <cstdint>
@@ -23,38 +23,38 @@ core::Result<dna::Dna> parse(View bytes, const dna::ParseOptions& options = {});
 /// A Dna, or an error with a field and an offset inside the file.
 std::string reading(View bytes, const core::Result<dna::Dna>& dna);
 
-/// check finds an error exactly when parse fails, and places all that it finds.
+/// check finds an error exactly if parse fails, and gives a place for every finding.
 std::string checking(View bytes, bool is_good);
 
-/// What is written for a version is read again and written as it was.
+/// A file written for a version is read again and written without a change.
 std::string rewriting(const dna::Dna& dna, std::uint16_t minor);
 
-/// JSON and back writes the same bytes and the same JSON.
+/// JSON and back gives the same file and the same JSON.
 std::string json(const dna::Dna& dna);
 
-/// Text that from_json accepts becomes the same JSON twice, and a file.
+/// Text that from_json accepts gives the same JSON twice, and a file.
 std::string json_text(std::string_view text);
 
 /// Compiles and evaluates in every way, with controls, options and a second instruction set drawn
-/// from seed: results are finite where the file's numbers and the controls are moderate, the
-/// instruction sets agree, a frame of a batch is the frame alone, and the bytes of the rig are one.
+/// from seed. Results are finite if the file's numbers and the controls are moderate, the
+/// instruction sets agree, a frame of a batch equals the frame alone, and the bytes of the rig can
+/// be opened.
 std::string evaluation(const dna::Dna& dna, std::uint32_t seed);
 
-/// Bytes that say that they are a compiled rig: open_rig refuses them, or they can be evaluated.
-/// Their hash is put right first.
+/// Bytes of a compiled rig with a corrected hash: open_rig refuses them, or they can be evaluated.
 std::string opening(View bytes, std::uint32_t seed);
 
-/// Options as the first 8 bytes say; the rest is the file.
+/// The first 8 bytes are options; the rest is the file.
 inline constexpr std::size_t kOptionBytes = 8;
 
-/// A load of some layers and LODs is the full load, filtered and without the other layers.
+/// A load of some layers and LODs equals the full load, filtered and without the other layers.
 std::string filtering(View bytes);
 
-/// The result can be written, and converting it once more changes nothing.
+/// The result can be written, and a second conversion changes nothing.
 std::string conversion(const dna::Dna& dna, View options);
 
 /// All of the above, for tests: written for its own version and for one of 2.1 to 2.8, evaluated,
-/// filtered and converted with one choice; turn makes the choices.
+/// filtered and converted with one set of options; turn selects them.
 std::string everything(View bytes, std::size_t turn);
 
 }  // namespace risorius::promises

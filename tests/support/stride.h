@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Tests that change each byte of a file in turn.
+// For tests that change each byte of a file in turn.
 #pragma once
 
 #include <algorithm>
@@ -13,8 +13,8 @@
 
 namespace risorius::testing_support {
 
-// The sanitizers take four times as long and see what every fifth byte does; the plain build
-// takes each one, and the fuzzers, which are sanitized too, others every time.
+// The sanitizers take four times as long and test every fifth byte. The plain build tests each
+// byte, and the fuzzers, which are sanitized too, test different ones every time.
 #if defined(RISORIUS_STRIDE)  // an emulator takes forty times as long
 inline constexpr std::size_t kStride = RISORIUS_STRIDE;
 #elif defined(RISORIUS_SANITIZED)
@@ -23,13 +23,13 @@ inline constexpr std::size_t kStride = 5;
 inline constexpr std::size_t kStride = 1;
 #endif
 
-// Which bytes of a file are changed: from first, each step-th.
+// The bytes of a file to change: from first, each step-th.
 struct Steps {
   std::size_t first, step;
 };
 
-// A program that is run with each instruction set changes other bytes in each, so that together
-// the runs pass over few: what a changed byte does is the same in all of them.
+// A program that runs with each instruction set changes different bytes in each, so that together
+// the runs skip few; the effect of a changed byte is the same in all of them.
 inline Steps shared_steps() {
   constexpr std::string_view kSets[] = {"scalar", "sse4", "avx2", "avx512", "neon"};
   constexpr std::size_t kOfOneProcessor = 4, kStep = std::max(kStride, kOfOneProcessor);
@@ -40,8 +40,8 @@ inline Steps shared_steps() {
   return {0, kStride};
 }
 
-// Bytes of a file to change: each one, but of those that stand with the same neighbours in another
-// file, whose bytes are all changed too, one in four.
+// The bytes of a file to change: every byte, but only one in four of those that occur with the same
+// neighbours in another file whose bytes are all changed.
 inline std::vector<std::size_t> bytes_to_change(const std::vector<std::uint8_t>& file,
                                                 const std::vector<std::uint8_t>& other) {
   constexpr std::size_t kBefore = 24, kAround = 40;

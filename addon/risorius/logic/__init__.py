@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What needs no Blender: names, groups of controls, spaces, plans. Imports neither bpy nor
-the native module."""
+"""Code without Blender: names, groups of controls, spaces, plans. It imports neither bpy nor the
+native module."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Operators whose work goes on beside Blender: progress in the status bar, Esc cancels."""
+"""Operators with work beside Blender: progress in the status bar, Esc cancels."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ else:
 
 
 class RunsBeside(_Base):
-    """For an operator: what `finish`, `shown` and `cancelled_text` say is theirs.
+    """Base of such operators, which define `finish`, `shown` and `cancelled_text`.
 
-    In background mode, and where the last operation is adjusted, it waits instead.
+    In background mode, and in the redo panel, it waits for the result instead.
     """
 
     def wait_beside(self) -> None:
-        """Called by invoke: a person is there who may go on working."""
+        """Work beside Blender; called by invoke, when a person uses the interface."""
         self._beside = not bpy.app.background
 
     def begin(self, context: Context, task: Task) -> Result:
         """Start the task, or do it now.
 
         Args:
-            context: with a window, where there is one.
-            task: of which the operator knows more.
+            context: with a window, if any.
+            task: the task of the operator.
         """
         self._running = task
         # Adjusting the last operation calls this again, on the same operator.
@@ -73,13 +73,13 @@ class RunsBeside(_Base):
         context.workspace.status_text_set(None)
 
     def finish(self, context: Context) -> Result:
-        """What is done with the task's result, or its error."""
+        """Use the result or the error of the task."""
         raise NotImplementedError
 
     def shown(self, share: int) -> str:
-        """What the status bar says. Args: share  per cent that is done."""
+        """The text of the status bar. Args: share finished per cent."""
         raise NotImplementedError
 
     def cancelled_text(self) -> str:
-        """What is reported after Esc."""
+        """The report after Esc."""
         raise NotImplementedError

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # A checker sees methods that take a Context with a scene; Blender's take any:
 # pyright: reportIncompatibleMethodOverride=false
-"""Blender's classes as operators, panels and menus meet them, for annotations.
+"""Blender's classes for annotations of operators, panels and menus.
 
-The stubs of Blender's API leave open whether there is a layout. There is one while a panel is
-drawn, and a checker shall not ask for it each time. While the add-on runs all names here are
-Blender's own classes. What is Any here is so because a list shows items of any kind.
+In the stubs of Blender's API a panel may lack a layout. It has one while it is drawn, so code need
+not test it each time. At run time all names here are Blender's own classes. Any is used because a
+list shows items of any kind.
 """
 
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -59,7 +59,7 @@ if TYPE_CHECKING:
         def draw(self, context: Context) -> None: ...
 
     class _FileSelector:
-        """Beside Operator: has a path that the user chooses."""
+        """Mixin of Operator with a path that the user chooses."""
 
         filepath: str
 
@@ -104,7 +104,7 @@ if TYPE_CHECKING:
         def draw_filter(self, context: Context, layout: UILayout) -> None: ...
 
     class FileHandler(bpy.types.FileHandler):
-        """What takes files that are dropped onto a window."""
+        """Handler of files dropped onto a window."""
 
         @classmethod
         def poll_drop(cls, context: Context) -> bool: ...

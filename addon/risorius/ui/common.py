@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What operators and panels of all features share: when they are usable, how they report."""
+"""Shared code of operators and panels: availability, reports."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,11 +25,11 @@ MODES = (
 
 
 def explain(path: str | Path, error: Exception) -> str:
-    """One sentence for what is wrong with a file.
+    """One sentence about an error of a file.
 
     Args:
         path: of the file; its name begins the sentence, unless the error names it.
-        error: what reading or writing it raised.
+        error: error from reading or writing it.
     """
     reason = error.strerror if isinstance(error, OSError) else None
     text = names.printable(reason or of_error(error)).strip().rstrip(".")
@@ -38,19 +38,19 @@ def explain(path: str | Path, error: Exception) -> str:
 
 
 def system_path(path: str) -> str:
-    """A path that a dialog or a script gave, as the system has it: `//` is the .blend's folder.
+    """Convert a path of a dialog or script to a system path; `//` is the folder of the .blend.
 
     Args:
-        path: of a file or a folder; an empty one stays.
+        path: of a file or folder; an empty path stays.
     """
     return bpy.path.abspath(path) if path else path
 
 
 def proposed_file(name: str, ending: str) -> str:
-    """The name that a file dialog proposes; names of a .blend lead into no other folder.
+    """The name that a file dialog proposes; names from a .blend cannot lead to another folder.
 
     Args:
-        name: of what is written.
+        name: of the exported thing.
         ending: of its file, with the dot.
     """
     found: str = native.part("files.names").file_name(name.removesuffix("_rig"), ending)
@@ -58,7 +58,7 @@ def proposed_file(name: str, ending: str) -> str:
 
 
 def usable(cls: type[Operator]) -> bool:
-    """Poll: whether the native module is there; says why when it is not."""
+    """Poll: whether the native module is available; otherwise set the reason."""
     trouble = native.problem()
     if trouble:
         cls.poll_message_set(say(trouble))
@@ -107,13 +107,13 @@ def face_controls(context: Context) -> ArmatureObject:
 
 
 def as_seen(context: Context) -> bool:
-    """Whether left and right are those of one who looks at the face, else the character's own."""
+    """Whether left and right are those of the viewer, and not the character's."""
     addon = context.preferences.addons.get(native.ADDON)
     return addon is None or getattr(addon.preferences, "sides", "SEEN") == "SEEN"
 
 
 class FaceOperator(OperatorBase):
-    """What all operators on a face share; a class says by its attributes which faces will do."""
+    """Base of all operators on a face. Class attributes say which faces are suitable."""
 
     bl_options = {"REGISTER", "UNDO"}
     whole_face = True  # the face must have its controls and its DNA
@@ -122,7 +122,7 @@ class FaceOperator(OperatorBase):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether there is a face to work on; says why when there is not."""
+        """Whether a suitable face exists; otherwise set the reason."""
         if not usable(cls):
             return False
         rig = parts.active_rig(context)
@@ -144,7 +144,7 @@ class FaceOperator(OperatorBase):
 
 
 class FacePanel(PanelBase):
-    """What all panels of the tab share."""
+    """Base of all panels of the tab."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -152,7 +152,7 @@ class FacePanel(PanelBase):
 
 
 class FaceOnlyPanel(FacePanel):
-    """A panel that is there only with a face."""
+    """A panel that is shown only with a face."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words in panels and dialogs: whether they fit, and what a number or an empty field stands for."""
+"""Text in panels and dialogs: fitting, wrapping, and meanings of special values."""
 
 import textwrap
 from typing import Any
@@ -26,7 +26,7 @@ class Ruler:
     """Tells which labels can be read whole in a share of the sidebar's width."""
 
     def __init__(self, context: Context, share: float) -> None:
-        """Args: context  has the region, else the sidebar is a new one; share  0 to 1."""
+        """Args: context with the region, or a new sidebar is assumed; share 0 to 1."""
         preferences, region = context.preferences, context.region
         width: float = _SIDEBAR
         if region is not None and region.type == "UI" and region.width > 1:
@@ -44,12 +44,12 @@ class Ruler:
     ("unregister",), 2048
 )  # a panel asks for the names of all sliders each time it is drawn
 def width_of(text: str, points: float, font: str = "") -> float:
-    """Pixels that a text takes in buttons and labels, at an interface scale of 1.
+    """Width of a text in buttons and labels in pixels, at an interface scale of 1.
 
     Args:
         text: the words.
-        points: size of the letters, of the preferences' style.
-        font: path of the interface's font: with another one the text is measured anew.
+        points: size of the letters in the preferences.
+        font: path of the interface's font: another font has other widths.
     """
     blf.size(0, points)
     return blf.dimensions(0, text)[0]
@@ -58,13 +58,13 @@ def width_of(text: str, points: float, font: str = "") -> float:
 def prop_or(
     layout: UILayout, owner: bpy.types.bpy_struct, name: str, empty: float | str, meaning: str
 ) -> None:
-    """A property, and below it in words what is done where it is left as it is.
+    """A property, and below it the meaning of its special value.
 
     Args:
         layout: of the panel or dialog.
         owner, name: the property.
-        empty: its value that stands for something else, as -1, 0 or "".
-        meaning: the words.
+        empty: the special value, such as -1, 0 or "".
+        meaning: meaning of the special value.
     """
     layout.prop(owner, name)
     if getattr(owner, name) == empty:
@@ -74,7 +74,7 @@ def prop_or(
 
 
 def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
-    """A field for words to look for. Blender writes Search into it, in few languages.
+    """A search field. Blender's own placeholder is translated into few languages.
 
     Args:
         layout: of the panel.
@@ -86,7 +86,7 @@ def search(layout: UILayout, owner: bpy.types.bpy_struct, name: str) -> None:
 
 @session.cached(("unregister",))
 def _has_placeholder() -> bool:
-    """Whether fields of this Blender can say what they are for."""
+    """Whether fields of this Blender have placeholders."""
     functions: Any = bpy.types.UILayout.bl_rna.functions  # pyright: ignore  the stub has none
     return "placeholder" in functions["prop"].parameters
 
@@ -96,8 +96,8 @@ def write(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
 
     Args:
         layout: of the panel.
-        text: the sentence; in the user's language where the table of words has it.
-        icon: before the first line.
+        text: the sentence; it is translated if the table has it.
+        icon: icon before the first line.
     """
     column = layout.column(align=True)
     column.scale_y = 0.8
@@ -109,8 +109,8 @@ def say(text: str, **values: object) -> str:
     """A label or sentence in the user's language.
 
     Args:
-        text: in English, as in the table of words, with {names} of the values; or a Sentence.
-        values: what stands for them: numbers, names of things, which are never translated.
+        text: English text of the table, with {names} of values; or a Sentence.
+        values: values: numbers and names, which are never translated.
     """
     follow_language()
     if isinstance(text, Sentence):
@@ -121,19 +121,19 @@ def say(text: str, **values: object) -> str:
 
 
 def name_of_new(text: str) -> str:
-    """The name of something new: in the user's language where Blender gives such names in it."""
+    """The name of a new datablock, translated if Blender translates such names."""
     follow_language()
     return bpy.app.translations.pgettext_data(text, CONTEXT) or text
 
 
 def of_error(error: Exception) -> str:
-    """What an error says; in the user's language where a sentence was given to it."""
+    """The text of an error, translated if it has a Sentence."""
     first = error.args[0] if error.args else ""
     return say(first) if isinstance(first, Sentence) else str(error)
 
 
 def local(text: str) -> str:
-    """A sentence in the user's language where it can be said so; other text as it is."""
+    """A translated Sentence; other text stays as it is."""
     return say(text) if isinstance(text, Sentence) else text
 
 
@@ -143,18 +143,18 @@ def mark(text: str) -> str:
 
 
 def show(layout: UILayout, text: str, icon: Icon = "NONE") -> None:
-    """A label that is shown as it is: the name of a thing, or words that `say` gave.
+    """A label shown unchanged: a name, or text from `say`.
 
     Args:
         layout: of the panel.
         text: the label.
-        icon: before it.
+        icon: icon before the label.
     """
     layout.label(text=text, icon=icon, translate=False)
 
 
 def bar(layout: UILayout, value: float) -> None:
-    """A number from 0 to 1 as a bar that cannot be moved.
+    """A number from 0 to 1 as a read-only bar.
 
     Args:
         layout: of the panel.
@@ -185,7 +185,7 @@ def forget_language() -> None:
 
 
 def give_context(cls: type) -> None:
-    """Let Blender look for a class's words, and those of its properties, among ours first.
+    """Let Blender search translations of a class and its properties in the add-on's table first.
 
     Args:
         cls: an operator, a panel, a menu or a group of properties, before it is registered.

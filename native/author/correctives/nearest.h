@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The nearest triangle to a point, in a tree of boxes.
+// The nearest triangle to a point, found in a tree of boxes.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,12 +16,12 @@ namespace risorius::author::detail {
 
 using Vec3 = Eigen::Vector3d;
 
-/// A surface as it lies now. It is kept, not copied: both spans live longer than the tree.
+/// A surface at its present positions. The tree refers to both spans, which must live longer.
 class Nearest {
  public:
   struct Hit {
     std::uint32_t triangle = 0;
-    Vec3 share = Vec3::Zero();  // of the triangle's corners in the nearest point; sums to 1
+    Vec3 share = Vec3::Zero();  // barycentric coordinates of the nearest point; sum 1
     Vec3 point = Vec3::Zero();
     double distance = 0.0;
   };
@@ -40,7 +40,7 @@ class Nearest {
  private:
   struct Box {
     Vec3 low, high;
-    std::uint32_t begin = 0, end = 0;  // of order_
+    std::uint32_t begin = 0, end = 0;  // range in order_
     std::uint32_t second = 0;          // the first child follows its parent; 0: a leaf
   };
   std::uint32_t grow(std::uint32_t begin, std::uint32_t end);

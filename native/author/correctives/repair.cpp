@@ -13,45 +13,48 @@ namespace risorius::author::detail {
 
 namespace {
 
-constexpr std::size_t kFades = 9, kSteps = 6;  // a part is undone in so many
-constexpr double kUndone = 2.0;  // what all undone motion costs; all faults of a kind cost 1
-// A cost at which nothing else is tried. Any fault that is left costs as much beside its share.
+// Numbers of steps in which a part of the pose is faded out.
+constexpr std::size_t kFades = 9, kSteps = 6;
+constexpr double kUndone = 2.0;  // cost of undoing the whole motion; all faults of one kind cost 1
+// At or below this cost no other way is tried. A candidate with any fault left pays it in addition.
 constexpr double kEnough = 0.15;
-constexpr double kWhole = 2.0;   // mm around a fault that are undone alike
-constexpr double kNarrow = 5.0;  // mm within which it is tried first: less is held back
+constexpr double kWhole = 2.0;   // mm around a fault in which the motion is undone completely
+constexpr double kNarrow = 5.0;  // mm, the radius tried first because it undoes less of the pose
 constexpr std::size_t kRounds = 6;
-// What an asked place, an asked edge, an asked evenness and rest weigh beside smoothness.
+// Weights of the goals against smoothness: places, edge vectors, flatness, no displacement.
 constexpr double kPlace = 1.0, kEdge = 1.0, kEven = 0.5, kRest = 0.002;
-constexpr double kBeyond = 0.5;  // of kDepth: faults end well within what is left alone
-// What is given back where nothing is wrong: up to this share of the vertex' way, less by so much
-// in each round near what that makes wrong.
+// Share of kDepth: a repaired vertex ends well within the tolerance.
+constexpr double kBeyond = 0.5;
+// Vertices without a fault get back up to kKept of their motion. A vertex near a fault that this
+// causes gets kLess less in each of kBacks rounds.
 constexpr double kKept = 0.91, kLess = 0.2;
 constexpr std::size_t kBacks = 12;
-// The worst place of all may be deeper by so many mm, the widest face wider by this factor.
+// The deepest vertex of all may become deeper by kDeeper mm, the widest face wider by kWider.
 constexpr float kDeeper = 0.09f, kWider = 1.005f;
 
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// What is asked of the displacement x: of vertices a place, of edges a difference, of vertices
-/// that lie where their neighbours are.
+/// Goals for the displacement x, in mm: a place for a vertex, a difference for an edge, and a place
+/// nearer to its neighbours' middle for a vertex at a fold.
 struct Asked {
   std::map<std::uint32_t, Vec3> places;
   std::map<std::array<std::uint32_t, 2>, Vec3> edges;
   std::map<std::uint32_t, Vec3> even;
 };
 
-/// Everything of one repair.
+/// The state of one repair.
 struct Work {
   const Topology& topology;
   const Placed& pose;
   const SolidSurfaces& solids;
   SkinFaults allowed;
-  float deepest = 0.0f, widest = 0.0f;  // of the pose, allowed ones too; widest: kStretch at least
-  std::vector<std::uint32_t> active;    // vertices that may move
-  std::vector<std::uint32_t> place;     // [V] in active, or kStill
-  std::vector<Vec3> x;                  // [V] mm
+  // Largest in the pose, allowed faults included; widest: kStretch at least.
+  float deepest = 0.0f, widest = 0.0f;
+  std::vector<std::uint32_t> active;  // vertices that may move
+  std::vector<std::uint32_t> place;   // [V] index in active, or kStill
+  std::vector<Vec3> x;                // [V] mm
   Asked asked;
-  Region region;  // what may change
+  Region region;  // the vertices and triangles that are checked
   static constexpr std::uint32_t kStill = 0xffffffffu;
 
   std::vector<Vec3> moved() const {
@@ -61,7 +64,7 @@ struct Work {
   }
 };
 
-/// One look: contacts, faults and their sums.
+/// The result of one check: contacts, faults and their sums.
 struct Look {
   std::vector<Contact> contacts;
   SkinFaults faults;
@@ -101,7 +104,7 @@ std::vector<std::uint32_t> fault_vertices(const Work& work, const Look& look) {
   return out;
 }
 
-/// Which vertices may move: those near a fault.
+/// Lets the vertices near a fault move: those within SkinChecker::kAround.
 void mark(Work& work, const std::vector<std::uint32_t>& faults) {
   const auto& neutral = work.topology.neutral;
   work.place.assign(neutral.size(), Work::kStill);
@@ -139,7 +142,8 @@ void ask_contacts(Work& work, const Look& look) {
   for (const auto& [v, sum] : sums) work.asked.places[v] = work.x[v] + sum.first / sum.second;
 }
 
-/// Faces that are too large, or larger than any was: their edges are to be shorter.
+/// Asks for shorter edges of faces that are stretched too far, or further than any face of the
+/// pose.
 void ask_stretched(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t f = 0; f < topology.face_count(); ++f) {
@@ -159,7 +163,7 @@ void ask_stretched(Work& work, const Look& look, const std::vector<Vec3>& now) {
   }
 }
 
-/// How a vertex lies beside the middle of those around it.
+/// The vector to a vertex from the mean of its neighbours.
 Vec3 beside(const Topology& topology, const std::vector<Vec3>& positions, std::uint32_t v) {
   const std::uint32_t first = topology.first_neighbour[v], last = topology.first_neighbour[v + 1];
   Vec3 out = positions[v];
@@ -169,7 +173,8 @@ Vec3 beside(const Topology& topology, const std::vector<Vec3>& positions, std::u
   return out;
 }
 
-/// A fold opens where vertices come to the middle of those around, as far as they lay there.
+/// Opens a fold: each vertex is drawn towards the mean of its neighbours, but keeps the distance
+/// that it has in the neutral pose, up to half of the present one.
 void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   const Topology& topology = work.topology;
   for (std::size_t h = 0; h < topology.hinges.size(); ++h) {
@@ -187,7 +192,8 @@ void ask_folded(Work& work, const Look& look, const std::vector<Vec3>& now) {
   }
 }
 
-/// The displacement that all that is asked agrees on, as smooth as can be.
+/// Solves one sparse linear system: the smoothest displacement that meets the goals of places,
+/// edges and flatness in the least squares sense.
 void solve(Work& work, const std::vector<Vec3>& base) {
   const Topology& topology = work.topology;
   const auto count = static_cast<Eigen::Index>(work.active.size());
@@ -232,8 +238,8 @@ void solve(Work& work, const std::vector<Vec3>& base) {
   for (const std::uint32_t v : work.active) work.x[v] = base[v] + found.row(at(v)).transpose();
 }
 
-/// Whether no sum is worse, nor the deepest place and the widest face of all: what one part has
-/// alone is no fault, but undoing the other must not bring it.
+/// Whether no sum is worse, and neither the deepest vertex nor the widest face of all. A fault of
+/// one part alone is allowed, but undoing the other part must not cause it.
 bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
   const FaultSums& a = now.sums;
   return a.volume <= before.volume && a.deepest <= before.deepest + 0.01 &&
@@ -243,7 +249,7 @@ bool is_no_worse(const Work& work, const Look& now, const FaultSums& before) {
          std::ranges::max(now.faults.stretch) <= kWider * work.widest;
 }
 
-/// How much of what was wrong is left; 0 where nothing is.
+/// How much of the faults is left: a sum of shares, one for each kind; 0 if none is left.
 double share_left(const FaultSums& now, const FaultSums& before) {
   double out = before.volume > 0.0 ? now.volume / before.volume : 0.0;
   if (before.stretched > 0) out += double(now.stretched) / double(before.stretched);
@@ -251,19 +257,19 @@ double share_left(const FaultSums& now, const FaultSums& before) {
   return out;
 }
 
-/// How much of an undoing a vertex takes: all of it at a fault, none `reach` away.
+/// The share of an undoing at a vertex: 1 at a fault, 0 at the distance `reach`.
 double fading(double distance, double reach) {
   const double t = std::clamp((distance - kWhole) / (reach - kWhole), 0.0, 1.0);
   return 1.0 - t * t * (3.0 - 2.0 * t);
 }
 
-/// The best that was found so far: few faults left, and little undone.
+/// The best repair so far: few faults left, and little undone.
 struct Best {
   std::vector<Vec3> x;
   FaultSums sums;
   double left = 0.0, cost = 0.0;
-  // The same of all that was looked at, even if something is worse there: pushed out of that it may
-  // be the best.
+  // The cheapest displacement even if something is worse there. Pushing its faults out may give the
+  // best result.
   std::vector<Vec3> any;
   double any_cost = 0.0;
 
@@ -288,7 +294,7 @@ struct Best {
   }
 };
 
-/// Undoes a part where faults are, further and further until there are none.
+/// Undoes a part of the pose around its faults, more in each round, until no fault is left.
 /// In: reach  mm around a fault
 void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double reach, Best& best) {
   const auto& neutral = work.topology.neutral;
@@ -314,9 +320,9 @@ void fade(Work& work, const Look& first, const std::vector<Vec3>& undo, double r
   }
 }
 
-/// Ways in which parts may be undone: at each vertex those that do little there, so that what does
-/// most stays; each alone; all alike.
-/// In: without  where the skin lies without each of the parts
+/// The displacements that undo a part: a mix at each vertex that prefers the parts that do least
+/// there, so that the main motion stays; each part alone; the mean of all parts.
+/// In: without  the positions of the skin without each of the parts
 std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
                                          const std::vector<std::vector<Vec3>>& without) {
   const std::size_t count = pose.skin.size();
@@ -336,7 +342,7 @@ std::vector<std::vector<Vec3>> ways_back(const Placed& pose,
   return out;
 }
 
-/// Pushes what is left out of what it is in, softly. In: base  from there
+/// Pushes the remaining faults out softly. In: base  the displacement to start from
 void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& best) {
   work.x = base;
   work.asked = {};
@@ -352,8 +358,8 @@ void polish(Work& work, const Look& first, const std::vector<Vec3>& base, Best& 
   }
 }
 
-/// What vertices without a fault lack of kKept of their ways. In: x  where they are held
-/// Out: [V], all 0 where nothing lacks
+/// The motion that vertices without a fault lack to reach kKept of it. In: x  their displacement
+/// Out: [V], all 0 if nothing is lacking
 std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& faults,
                           const std::vector<Vec3>& x) {
   std::vector<Vec3> out(x.size(), Vec3::Zero());
@@ -366,8 +372,8 @@ std::vector<Vec3> lacking(const Work& work, const std::vector<std::uint32_t>& fa
   return out;
 }
 
-/// Where nothing is wrong a corrective is to undo nothing: what it does there, so that it ends
-/// softly, is taken from it as far as that brings no new fault.
+/// A corrective should undo nothing where there is no fault. Its soft edge is taken back at such
+/// vertices, unless that causes a new fault.
 void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
                Best& best) {
   const Topology& topology = work.topology;
@@ -392,7 +398,7 @@ void give_back(Work& work, const Look& first, const std::vector<std::uint32_t>& 
   }
 }
 
-/// The best of all ways, looked at in the work's region. Out: x is empty where nothing helps
+/// The best of all ways, checked in the work's region. Out: x is empty if no way helps
 Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& faults,
           const std::vector<std::vector<Vec3>>& ways) {
   Best best;
@@ -412,8 +418,8 @@ Best mend(Work& work, const Look& first, const std::vector<std::uint32_t>& fault
   return best;
 }
 
-/// Whether nothing is worse in all of the skin, which is looked at once more: skin that rests
-/// beside the region may have been gone into. In: allowed  by what the caller counts
+/// Whether nothing is worse in the whole skin. A full check is needed because the moved vertices
+/// may go into skin outside the region. In: allowed  the faults that the caller allows
 bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best) {
   work.x = best.x;
   const Look look = look_at(work, work.topology.whole);
@@ -422,7 +428,7 @@ bool settle(Work& work, const Look& first, const SkinFaults& allowed, Best& best
   return true;
 }
 
-/// What one part may have alone, no more of it than the pose has anywhere.
+/// Limits the allowed faults of one part to the worst fault of the pose.
 void limit(Work& work, const SkinFaults& first) {
   work.deepest = std::ranges::max(first.depth);
   work.widest = std::max(SkinChecker::kStretch, std::ranges::max(first.stretch));

@@ -12,14 +12,15 @@ namespace risorius::author::detail {
 
 namespace {
 
-constexpr double kReach = 6.0;      // mm: what lies deeper is inside for another reason
+constexpr double kReach = 6.0;      // mm: a vertex deeper in a solid is inside for another reason
 constexpr double kSkinReach = 4.0;  // mm, of the skin in itself
-constexpr double kOpposed = -0.2;   // cosine of normals that look at each other
-constexpr double kInFront = -0.2;   // mm before a surface that counts as before it
-constexpr std::size_t kWays = 128;  // directions in which light may leave
-constexpr std::ptrdiff_t kLit = 6;  // of them are needed
-constexpr std::size_t kRim = 2;     // edges beyond what is lit
-constexpr std::size_t kRings = 3;   // edges that are too near to touch
+constexpr double kOpposed = -0.2;   // cosine: surfaces below it face each other
+// Mm: a vertex this far behind a surface still counts as in front of it.
+constexpr double kInFront = -0.2;
+constexpr std::size_t kWays = 128;  // directions from which light may come
+constexpr std::ptrdiff_t kLit = 6;  // open directions that make a vertex lit
+constexpr std::size_t kRim = 2;     // edges: neighbours of lit vertices that are shown too
+constexpr std::size_t kRings = 3;   // edges: vertices this near cannot touch each other
 
 std::vector<Vec3> vertex_normals(std::span<const Triangle> triangles,
                                  std::span<const Vec3> positions) {
@@ -85,7 +86,8 @@ void find_around(Topology& out) {
   }
 }
 
-/// What a ray of light may leave when the face rests, and its rim (lips, lids) beyond.
+/// Finds the vertices that light reaches in the neutral pose, and the rim of lips and lids around
+/// them.
 void find_shown(Topology& out) {
   std::vector<Vec3> ways;  // spread evenly (Fibonacci)
   for (std::size_t i = 0; i < kWays; ++i) {
@@ -101,7 +103,7 @@ void find_shown(Topology& out) {
     const auto open = std::ranges::count_if(ways, [&](const Vec3& way) {
       return way.dot(normals[v]) > 0.1 && !surface.is_blocked(from, way);
     });
-    lit[v] = open >= kLit;  // a slit between closed lips lets some through
+    lit[v] = open >= kLit;  // a slit between closed lips lets light through
   }
   out.shown = lit;
   for (std::size_t r = 0; r < kRim; ++r) {
@@ -114,7 +116,7 @@ void find_shown(Topology& out) {
   }
 }
 
-/// Keeps of each vertex the contact that is deepest.
+/// Keeps the deepest contact of each vertex.
 void keep_deeper(std::vector<Contact>& best, const Contact& found) {
   if (found.depth > best[found.vertex].depth) best[found.vertex] = found;
 }
@@ -136,7 +138,7 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
           hit->share[static_cast<Eigen::Index>(k)] * normals[solid.triangles[hit->triangle][k]];
     }
     if ((p - hit->point).dot(normal) >= 0.0) continue;
-    // The way out is the one to the surface; on it that of the normal.
+    // The way out leads to the surface. On the surface it is the normal.
     const Vec3 out = hit->point - p;
     keep_deeper(best, {v,
                        static_cast<float>(hit->distance),
@@ -147,14 +149,14 @@ void touch_solid(const Topology& topology, const Region& region, std::size_t num
   }
 }
 
-/// The skin in itself: lips through lips, a lid through the other. What was behind the other
-/// surface when it rested is thin there, and touches nothing.
+/// Finds contacts of the skin with itself: lips with lips, a lid with the other. A vertex that lies
+/// behind the other surface in the neutral pose does not touch it: the skin is thin there.
 void touch_skin(const Topology& topology, const Region& region, const std::vector<Vec3>& skin,
                 std::vector<Contact>& best) {
   const std::vector<Vec3> normals = vertex_normals(region.triangles, skin);
   const Nearest nearest(region.triangles, skin);
   for (const std::uint32_t v : region.vertices) {
-    // What rests is found by what moves into it.
+    // A resting vertex needs no check: the vertex that moves into it finds the contact.
     if ((skin[v] - topology.neutral[v]).squaredNorm() < 1e-4) continue;
     const auto& near = topology.around[v];
     const auto takes = [&](std::uint32_t t) {
@@ -174,7 +176,7 @@ void touch_skin(const Topology& topology, const Region& region, const std::vecto
     const Vec3 normal =
         (skin[other[1]] - skin[other[0]]).cross(skin[other[2]] - skin[other[0]]).normalized();
     const double depth = (hit->point - skin[v]).dot(normal);
-    // Beside the triangle's rim nothing says on which side it is.
+    // Beside the rim of the triangle its normal does not tell on which side the vertex is.
     if (depth < 0.7 * hit->distance || depth <= 0.0) continue;
     keep_deeper(best, {v, static_cast<float>(depth), normal, true, other, hit->share});
   }

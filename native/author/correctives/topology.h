@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A skin with what is computed of it once. Private to native/author.
+// A skin and everything that is computed from it once. Private to native/author.
 #pragma once
 
 #include <Eigen/Core>
@@ -18,11 +18,11 @@ struct Hinge {
   std::array<std::uint32_t, 2> edge;
 };
 
-/// What of a skin is looked at, and what it may touch there.
+/// The vertices of a skin that are checked, and the triangles that they may touch.
 struct Region {
   std::vector<std::uint32_t> vertices;
   std::vector<Triangle> triangles;
-  std::vector<std::uint32_t> numbers;  // of these triangles among all
+  std::vector<std::uint32_t> numbers;  // of the triangles, in Topology::triangles
 };
 
 struct Topology {
@@ -34,8 +34,8 @@ struct Topology {
   std::vector<double> face_areas;      // [F] mm2, neutral
   std::vector<double> vertex_areas;    // [V] mm2, neutral
   std::vector<Vec3> triangle_normals;  // [triangles], neutral
-  Region whole;                        // all that is shown
-  std::vector<bool> shown;             // [V] what somebody may see: no mouth from inside
+  Region whole;                        // all shown vertices, all triangles
+  std::vector<bool> shown;             // [V] can be seen from outside; false inside the mouth
   std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, rows of a CSR matrix
   std::vector<std::vector<std::uint32_t>> around;  // [V] vertices up to three edges away, sorted
 
@@ -44,14 +44,14 @@ struct Topology {
 
 Topology make_topology(Skin skin);
 
-/// Where the skin touches something: it is to go by `amount` along `normal`, and what it touches,
-/// where that is skin too, the other way.
+/// A vertex that lies inside a solid or inside the skin. It has to move by `depth` along `normal`;
+/// skin that it touches has to move the other way.
 struct Contact {
   std::uint32_t vertex = 0;
   float depth = 0.0f;  // mm
   Vec3 normal = Vec3::Zero();
   bool is_skin = false;
-  Triangle other{};  // of the skin
+  Triangle other{};  // of the skin, if is_skin
   Vec3 share = Vec3::Zero();
 };
 
@@ -61,8 +61,8 @@ struct Placed {
   std::vector<std::vector<Vec3>> solids;
 };
 
-/// The solids of a pose, ready to be asked what is nearest. They keep what they are made of, not a
-/// copy: topology and pose live longer.
+/// The solids of a pose with a search tree each. They refer to topology and pose, which must live
+/// longer.
 class SolidSurfaces {
  public:
   SolidSurfaces(const Topology& topology, const Placed& pose);
@@ -70,17 +70,17 @@ class SolidSurfaces {
   std::vector<Nearest> trees;              // [solids]
 };
 
-/// All that is shown.
+/// All shown vertices and all triangles.
 Region whole_region(const Topology& topology);
-/// Some vertices, and the triangles that lie near them in a pose.
+/// Some vertices, and the triangles whose place in a pose is near them.
 Region region_around(const Topology& topology, const Placed& pose,
                      const std::vector<std::uint32_t>& vertices);
 
-/// Every vertex of a region that lies inside of something, by what it is deepest in.
+/// The vertices of a region that lie inside a solid or the skin, each with its deepest contact.
 std::vector<Contact> find_contacts(const Topology& topology, const Region& region,
                                    const SolidSurfaces& solids, const std::vector<Vec3>& skin);
 
-/// [F] areas, and [F] normals.
+/// Out: areas [F] in mm2, normals [F]
 void face_shapes(const Topology& topology, const std::vector<Vec3>& positions,
                  std::vector<double>& areas, std::vector<Vec3>& normals);
 
@@ -89,13 +89,13 @@ SkinFaults find_faults(const Topology& topology, const std::vector<Vec3>& skin,
 
 FaultSums sum_faults(const Topology& topology, const SkinFaults& faults, const SkinFaults& allowed);
 
-/// Which of all are faults beyond what is allowed.
+/// Whether an entry is a fault beyond the allowed one.
 inline bool is_deep(const SkinFaults& f, const SkinFaults& allowed, std::size_t v) {
   return f.depth[v] > allowed.depth[v] + SkinChecker::kDepth;
 }
 inline bool is_stretched(const Topology& t, const SkinFaults& f, const SkinFaults& allowed,
                          std::size_t face) {
-  constexpr double kSmallest = 0.5;  // mm2: what nobody sees
+  constexpr double kSmallest = 0.5;  // mm2: a smaller face cannot be seen
   return f.stretch[face] > SkinChecker::kStretch && f.stretch[face] > allowed.stretch[face] &&
          t.face_areas[face] > kSmallest;
 }
@@ -103,7 +103,7 @@ inline bool is_folded(const SkinFaults& f, const SkinFaults& allowed, std::size_
   return f.fold[hinge] < SkinChecker::kFold && allowed.fold[hinge] >= SkinChecker::kFold;
 }
 
-/// In: without  where the skin lies without each of the pose's parts
+/// In: without  the positions of the skin without each of the pose's parts
 Repair repair_pose(const Topology& topology, const Placed& pose, const SkinFaults& allowed,
                    const std::vector<std::vector<Vec3>>& without);
 

@@ -64,7 +64,7 @@ core::Status check_given(const std::vector<GivenJoint>& given, std::size_t expre
     if (other == GivenJoint::kUnknown) continue;
     if (other < given.size() && given[other].mirrored == j) continue;
     return core::fail(ErrorCode::kInvalidIndex, "given[" + std::to_string(j) + "]",
-                      "a joint of the other side was expected whose other side it is");
+                      "a pair of joints that name each other as the other side was expected");
   }
   for (const GivenJoint& g : given) {
     if (g.motions.empty() || g.motions.size() == expressions) continue;

@@ -23,17 +23,19 @@ using detail::State;
 using detail::Vec3;
 
 constexpr int kRoundsOfWeights = 12;
-constexpr std::size_t kRoundsOfMotions = 8;  // of Gauss and Newton
-// Joints leave an expression step by step: the others have taken over before the next ones go.
+constexpr std::size_t kRoundsOfMotions = 8;  // Gauss-Newton steps
+// Joints leave an expression in two steps, so that the others take over before more joints leave.
 constexpr double kThinning[] = {0.5, 1.0};
-/// The last rounds: joints lie at their pivots (before, they lie amid what they move: from a far
-/// pivot they turn on their own worse), and what momentum overshoots is evened out.
+/// In the last rounds joints lie at their pivots, and the overshoot of momentum is corrected.
+/// Before, a joint lies in the middle of its vertices, because a turn about a far pivot is solved
+/// less exactly.
 constexpr std::size_t kLastRounds = 4;
 constexpr double kMomentum = 0.6;
-/// Joints that stay where they are: those that a vertex needs may lie further off than its
-/// neighbours'.
+/// Nearby joints that a vertex tries when joints cannot move. The joints it needs may be further
+/// away than its neighbours' joints.
 constexpr std::size_t kNearOfGiven = 12;
-/// [V] the square of the largest error of each vertex in any expression, as far as it counts.
+/// [V] the square of each vertex's largest error in any expression, weighted by the caller's
+/// importance.
 std::vector<double> worst_squares(const Problem& problem, const std::vector<float>& left) {
   std::vector<double> out(problem.vertices);
   for (std::size_t v = 0; v < problem.vertices; ++v) {
@@ -48,7 +50,7 @@ std::vector<double> worst_squares(const Problem& problem, const std::vector<floa
   return out;
 }
 
-/// Vertices whose largest error stands out count more from here on.
+/// Raises the importance of vertices whose largest error is above average.
 void emphasise(Problem& problem, const std::vector<float>& left, double power) {
   if (power <= 0.0) return;
   std::vector<double> worst = worst_squares(problem, left);
@@ -96,7 +98,7 @@ Fit pack(const Problem& problem, const State& state, std::size_t expressions) {
   return out;
 }
 
-/// How many joints there are after each step of growing.
+/// The number of joints after each step of growing.
 std::vector<std::size_t> stages(std::size_t joints) {
   std::vector<std::size_t> out{joints};
   while (out.back() > 30) out.push_back(out.back() * 2 / 3);
@@ -104,7 +106,7 @@ std::vector<std::size_t> stages(std::size_t joints) {
   return out;
 }
 
-class Steps {  // tells how far the work is
+class Steps {  // reports the share of work that is done
  public:
   Steps(const Progress& progress, std::size_t count) : progress_(progress), count_(count) {}
   bool go_on() {
@@ -124,14 +126,14 @@ void improve(const Problem& problem, State& state, std::vector<float>& left) {
   detail::find_residual(problem, state, left);
 }
 
-/// What is left, squared, all vertices alike.
+/// The sum of squared residuals, all vertices alike.
 double squares(const std::vector<float>& left) {
   double sum = 0.0;
   for (const float x : left) sum += double{x} * double{x};
   return sum;
 }
 
-/// What a round would end at, kept where its largest error is the smallest so far.
+/// The state of the round whose largest error is the smallest so far.
 struct Best {
   std::optional<State> state;
   double largest = std::numeric_limits<double>::infinity();  // squared
@@ -146,7 +148,7 @@ struct Best {
   }
 };
 
-/// Joints leave the expressions in which they do little, and the others take over.
+/// Removes joints from expressions in which they do little; the other joints take over.
 void thin_out(const Problem& problem, double least_effect, State& state, std::vector<float>& left) {
   for (const double share : kThinning) {
     detail::leave_expressions(problem, state, share * least_effect * problem.scale);
@@ -158,7 +160,7 @@ void thin_out(const Problem& problem, double least_effect, State& state, std::ve
   }
 }
 
-/// New joints that rest, each in the middle of what it moves or at its pivot.
+/// Adds new joints at rest, each in the middle of its vertices or at its pivot.
 core::Status take_new_joints(const Problem& problem, const StartWeights& weights,
                              const std::vector<std::uint32_t>& at, State& state) {
   const std::size_t given = state.joints.size();
@@ -190,7 +192,8 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
   detail::take_pivots(options.pivots, problem);
   State state = detail::start(problem, options.given, shapes.expressions);
   std::vector<float> left;
-  if (!options.given.empty()) {  // what the given joints move is theirs before others come
+  // Given joints get the vertices that they move before other joints are added.
+  if (!options.given.empty()) {
     for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
   }
   detail::find_residual(problem, state, left);
@@ -213,10 +216,10 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
     problem.momentum = last ? 0.0 : kMomentum;
     improve(problem, state, left);
     if (problem.to_pivots) best.take(problem, state, left);
-    // The last two rounds even out what the new importance asked for.
+    // The last two rounds only even out the new importance.
     if (r + 2 < options.rounds) emphasise(problem, left, options.emphasis);
     const double now = squares(left);
-    if (now > before) state.solved.clear();  // momentum leads astray: it begins anew
+    if (now > before) state.solved.clear();  // momentum overshot: start it again
     before = now;
     if (!steps.go_on()) return stopped();
   }
@@ -234,7 +237,7 @@ core::Result<Fit> fit_joints(const Shapes& shapes, const FitOptions& options,
 core::Result<Fit> fit_motions(const Shapes& shapes, const FitOptions& options,
                               const StartWeights& weights, const std::vector<std::uint32_t>& at) {
   FitOptions own = options;
-  own.symmetric = false;  // as symmetric as the shapes and the weights are
+  own.symmetric = false;  // the result is as symmetric as the shapes and the weights
   RISORIUS_TRY(detail::check(shapes, own));
   Problem problem = detail::make_problem(shapes, own);
   detail::take_pivots(own.pivots, problem);
@@ -272,8 +275,8 @@ core::Result<Fit> fit_weights(const Shapes& shapes, const std::vector<GivenJoint
   problem.near = kNearOfGiven;
   State state = detail::start(problem, joints, shapes.expressions);
   RISORIUS_TRY(detail::take_start(start_weights, state));
-  // Neighbours tell each other which joints are worth trying: once round a ring, twice for the
-  // next.
+  // Neighbours tell each other which joints to try; each round reaches one ring of vertices
+  // further.
   for (int round = 0; round < kRoundsOfWeights; ++round) detail::solve_weights(problem, state);
   return pack(problem, state, shapes.expressions);
 }

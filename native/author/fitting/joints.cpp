@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where new joints go: to the vertices whose error is largest, apart from each other.
+// Places new joints at the vertices with the largest error, apart from each other.
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +9,7 @@ namespace risorius::author::detail {
 
 namespace {
 
-/// Error of each vertex over all expressions, evened out over its neighbours.
+/// Error of each vertex over all expressions, averaged with its neighbours.
 std::vector<double> errors(const Problem& problem, const std::vector<float>& left) {
   std::vector<double> raw(problem.vertices), out(problem.vertices);
   const std::size_t row = 3 * problem.expressions;
@@ -30,12 +30,12 @@ std::vector<double> errors(const Problem& problem, const std::vector<float>& lef
   return out;
 }
 
-/// Where as many joints as there are lie over what moves: the mean distance between two.
+/// The mean distance between two joints if all joints were spread over the moving vertices.
 double spacing(const Problem& problem, std::size_t joints) {
   double moving = 0.0;
   const double most = *std::max_element(problem.motion.begin(), problem.motion.end());
   for (const double m : problem.motion) moving += m > 0.02 * most ? 1.0 : 0.0;
-  // A head's surface is about three times the square of its size.
+  // The surface of a head is about three times its squared size.
   const double area = 3.0 * moving / static_cast<double>(problem.vertices);
   return std::sqrt(area / static_cast<double>(std::max<std::size_t>(joints, 1)));
 }
@@ -49,7 +49,7 @@ Joint make_joint(const Problem& problem, const Vec3& position, std::uint32_t mir
   return out;
 }
 
-/// Gives a new joint part of the weights round it, falling to nothing at `reach`.
+/// Gives a new joint a part of the weights around it, falling to 0 at `reach`.
 void take_weights(const Problem& problem, State& state, std::uint32_t joint, double reach) {
   const Vec3& centre = state.joints[joint].position;
   for (std::size_t v = 0; v < problem.vertices; ++v) {
@@ -67,7 +67,7 @@ void add_joints(const Problem& problem, State& state, const std::vector<float>& 
                 std::size_t count) {
   std::vector<double> error = errors(problem, left);
   const double reach = spacing(problem, count);
-  std::vector<double> room(problem.vertices, 1.0);  // 0 where a new joint lies, 1 far away
+  std::vector<double> room(problem.vertices, 1.0);  // 0 at a new joint, 1 far from all of them
   std::vector<std::uint32_t> fresh;
   const auto occupy = [&](const Vec3& centre) {
     for (std::size_t v = 0; v < problem.vertices; ++v) {

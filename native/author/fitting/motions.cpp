@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Motions of all joints for given weights: one sparse system for all expressions (a face turns
-// little), whose right side is exact, so that what it ends at is the optimum of turned joints.
+// Motions of all joints for given weights. One sparse system serves all expressions, because joints
+// turn little. Its right side is exact, so that the iteration ends at the optimum of turned joints.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
@@ -18,16 +18,17 @@ namespace {
 using Mat6 = Eigen::Matrix<double, 6, 6>;
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
-/// Of a thread: joints that were there have nothing to solve, a turned expression costs ten others.
+/// Work is split into this many ranges: given joints cost nothing, a far turned expression costs as
+/// much as ten others.
 constexpr std::size_t kRanges = 16;
-constexpr double kFar = 0.25;  // radians from which on arms count as turned
-// Ridges, shares of the joints' mean stiffness: what keeps joints that share vertices from turning
+constexpr double kFar = 0.25;  // radians: from this angle on, the turned arms are used
+// Ridges as shares of the joints' mean stiffness. They keep joints that share vertices from turning
 // against each other. Tried from 1e-4 to 10 on a head with 52 expressions, and on four others.
 constexpr double kTurn = 0.03;
 constexpr double kShift = 3e-3;
-// Of the energy of a step; ten thousand times as much led rounds astray.
+// Of the energy of a step. With a limit 10000 times as large some rounds made the fit worse.
 constexpr double kEnough = 1e-6;
-constexpr double kTurnAtPivot = 0.01;  // there a shift is the stranger one
+constexpr double kTurnAtPivot = 0.01;  // at a pivot a joint should turn and not shift
 constexpr double kShiftAtPivot = 0.01;
 
 Mat3 cross_matrix(const Vec3& a) {
@@ -49,7 +50,7 @@ struct Moments {
   }
 };
 
-/// What two joints have in common: sums over their vertices with arms p = v - a and q = v - b.
+/// Sums over the vertices that two joints share, with arms p = v - a and q = v - b.
 struct Shared {
   int column = 0;  // of the other joint
   std::uint32_t joint = 0;
@@ -68,7 +69,7 @@ Shared share(const Moments& m, const Vec3& a, const Vec3& b) {
   return out;
 }
 
-/// Stiffness of two joints against each other, turned and shifted, whose arms are turned already.
+/// Stiffness of two joints against each other; s holds the arms at rest.
 Mat6 block(const Shared& s, const Mat3& turn, const Mat3& other) {
   const Mat3 qp = other * s.qp * turn.transpose();
   Mat6 out;
@@ -81,7 +82,7 @@ Mat6 block(const Shared& s, const Mat3& turn, const Mat3& other) {
 
 using Sparse = Eigen::SparseMatrix<double>;
 
-/// A matrix factored once: densely where that is quicker.
+/// A matrix that is factored once: densely if that is faster.
 class Factor {
  public:
   void compute(const Sparse& lower) {
@@ -149,8 +150,8 @@ class System {
     for (std::size_t j = 0; j < rows_.size(); ++j) {
       for (const Shared& s : rows_[j]) {
         if (s.joint != j) continue;
-        // About the middle of what it moves: arms from a far pivot are no stiffness against
-        // turning.
+        // The stiffness is taken about the middle of the vertices: with the long arms from a far
+        // pivot it would be too large.
         const Vec3 off = state.joints[j].place - state.joints[j].position;
         const double own = s.qp.trace() - 2.0 * off.dot(s.p) + off.squaredNorm() * s.mass;
         turn_ += 2.0 / 3.0 * own / std::max(1, n);
@@ -169,8 +170,8 @@ class System {
   }
   const Factor& at_rest() const { return solver_; }
 
-  /// The lower half of the stiffness of some joints, where they are turned, as a full matrix.
-  /// In: at  by joint its place among them, ascending, or -1
+  /// The lower half of the stiffness of some joints in their present rotations, as a full matrix.
+  /// In: at  by joint: its index among them, ascending, or -1
   template <class Turn>
   Eigen::MatrixXd among(const std::vector<int>& at, int count, const Turn& turn) const {
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(6 * count, 6 * count);
@@ -185,7 +186,7 @@ class System {
     return out;
   }
 
-  /// The stiffness where joints are turned. In: turn(joint)  its rotation
+  /// The stiffness in the present rotations. In: turn(joint)  the joint's rotation
   template <class Turn>
   Sparse matrix(const Turn& turn) const {
     std::vector<Eigen::Triplet<double>> entries;
@@ -214,13 +215,13 @@ class System {
   Factor solver_;
 };
 
-/// What the residual asks of a joint in each expression: torque and force.
+/// The torque and the force of the residual on a joint in each expression.
 void gradient(const Problem& problem, const Joint& joint,
               const std::vector<ByJoint::Entry>& weights, const std::vector<float>& left,
               std::vector<Vec6>& out) {
   const std::size_t count = problem.expressions;
-  // Sums of r and of (v - c) r^T; the turned arm's torque follows from the second. One row of all
-  // expressions for each of the four and each axis of r.
+  // Sums of r and of (v - c) r^T; the torque of the turned arm follows from the second. Each of the
+  // four sums has one row of all expressions for each axis of r.
   std::vector<float> sums(12 * count, 0.0f);
   for (const auto& entry : weights) {
     const double s = problem.importance[entry.vertex] * entry.weight;
@@ -274,7 +275,8 @@ void update_motion(Joint& joint, std::size_t e) {
 
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left) {
   const std::size_t count = problem.expressions, joints = state.joints.size();
-  // [J][12][E] what moves a vertex, one row of all expressions for each number of the motion.
+  // [J][12][E] the motions that move vertices; a row of all expressions for each number of the
+  // matrix.
   std::vector<float> motions(joints * 12 * count);
   for (std::size_t j = 0; j < joints; ++j) {
     if (state.joints[j].rests) continue;
@@ -307,7 +309,7 @@ void find_residual(const Problem& problem, const State& state, std::vector<float
 
 namespace {
 
-/// Squared error of each expression, importance counted.
+/// Squared error of each expression, weighted by importance.
 std::vector<double> energies(const Problem& problem, const std::vector<float>& left) {
   const std::size_t count = problem.expressions;
   std::vector<double> out(count);
@@ -322,8 +324,8 @@ std::vector<double> energies(const Problem& problem, const std::vector<float>& l
   return out;
 }
 
-/// Goes the step in each expression, or half of it and less where the whole one leads uphill.
-/// Out: left  the residual there
+/// Takes the step in each expression, halved as long as the error grows.
+/// Out: left  the new residual
 void take_step(const Problem& problem, State& state, const System& system,
                const Eigen::MatrixXd& step, std::vector<float>& left) {
   const std::size_t count = problem.expressions;
@@ -364,7 +366,7 @@ void take_step(const Problem& problem, State& state, const System& system,
   }
 }
 
-/// The step of an expression that some joints take no part in.
+/// The step of an expression in which some joints take no part.
 Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t e,
                           const Eigen::VectorXd& right) {
   std::vector<int> at(state.joints.size(), -1);
@@ -385,8 +387,9 @@ Eigen::VectorXd solve_few(const State& state, const System& system, std::size_t 
   return out;
 }
 
-/// The step of an expression that turns joints far: conjugate gradients on the stiffness there.
-/// Where neighbours turn alike it is that at rest in the joints' own axes, which is the start.
+/// The step of an expression that turns joints far, by conjugate gradients on the stiffness there.
+/// The start is the solution with the stiffness at rest, expressed in the joints' own axes: that is
+/// exact if neighbours turn alike.
 Eigen::VectorXd solve_turned(const State& state, const System& system, std::size_t e,
                              const Eigen::VectorXd& right) {
   const Sparse matrix = system.matrix([&](std::size_t j) { return state.joints[j].rotations[e]; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Which expressions a joint takes part in, and where it lies.
+// Chooses the expressions that each joint takes part in, and its position.
 #include <algorithm>
 
 #include "author/fitting/problem.h"
@@ -40,7 +40,7 @@ void leave_expressions(const Problem& problem, State& state, double least) {
     if (joint.given) continue;
     joint.idle.resize(count);
     for (std::size_t e = 0; e < count; ++e) {
-      // Both sides do it, or none.
+      // A joint and its mirror leave the expression together.
       const bool also = other.empty() || small[joint.mirrored][other[e]];
       if (!small[j][e] || !also) continue;
       joint.idle[e] = true;
@@ -53,7 +53,7 @@ void leave_expressions(const Problem& problem, State& state, double least) {
 
 namespace {
 
-/// The pivot of the expressions that a good part of a joint's motion belongs to, or -1.
+/// The pivot of the expressions that hold a good part of a joint's motion, or -1.
 int pivot_of(const Problem& problem, const Joint& joint,
              const std::vector<ByJoint::Entry>& weights) {
   if (problem.pivots.empty() || !problem.to_pivots) return -1;
@@ -82,7 +82,7 @@ int pivot_of(const Problem& problem, const Joint& joint,
   return best;
 }
 
-/// The same motion about another point.
+/// Moves a joint without changing its motion.
 void place_at(const Problem& problem, const Vec3& to, Joint& joint) {
   const Vec3 arm = to - joint.position;
   for (std::size_t e = 0; e < problem.expressions; ++e) {
@@ -116,7 +116,7 @@ void move_joints(const Problem& problem, State& state) {
     const bool alone = joint.mirrored == j;
     if (!problem.mirror.empty() && alone) joint.place.x() = 0.0;
     int pivot = pivots[j];
-    if (!problem.mirror.empty() && joint.mirrored < j) {  // as the other side decided
+    if (!problem.mirror.empty() && joint.mirrored < j) {  // same as on the other side
       const int other = pivots[joint.mirrored];
       pivot = other < 0
                   ? -1

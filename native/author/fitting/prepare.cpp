@@ -14,7 +14,7 @@ namespace {
 
 using core::ErrorCode;
 
-/// Of the mean square of motion: as smooth as Dem Bones leaves weights with its own default.
+/// Share of the mean square of motion that gives weights as smooth as Dem Bones' default.
 constexpr double kSmoothness = 0.18;
 
 void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
@@ -33,8 +33,8 @@ void find_neighbours(const std::vector<Edge>& edges, Problem& problem) {
   }
 }
 
-/// Displacements in the fit's unit. An expression without a partner on the other side gets one, so
-/// that what the middle and both sides ask for is the same.
+/// Displacements in the fit's unit. An expression without a partner on the other side gets a
+/// mirrored one, so that the middle and both sides have the same goals.
 void take_displacements(const Shapes& shapes, Problem& problem) {
   std::vector<std::uint32_t> alone;
   if (!problem.mirror.empty()) {
@@ -113,8 +113,8 @@ void set_motion(const Problem& problem, const JointMotion& from, std::size_t e, 
   update_motion(joint, e);
 }
 
-/// A given joint. Expressions that were added as mirrors take the mirrored motion of their origin,
-/// which is the motion of the joint on the other side: see pair_given.
+/// Converts a given joint. In an added mirrored expression it takes the mirrored motion that its
+/// counterpart has in the original expression: see pair_given.
 Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t number) {
   Joint out;
   const Vector3& p = given.position;
@@ -129,13 +129,13 @@ Joint take_joint(const Problem& problem, const GivenJoint& given, std::uint32_t 
   return out;
 }
 
-/// Finds given joints' mirrors, and fills their motions in the expressions that were added.
+/// Pairs the given joints, and fills their motions in the added mirrored expressions.
 void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
                 std::vector<Joint>& joints, std::size_t own) {
   if (problem.mirror.empty()) return;
   const Mat3 flip = Vec3(-1, 1, 1).asDiagonal();
-  // Several joints may lie at one place: those of a lid lie in the middle of the eye. Their motions
-  // then tell which two mirror each other. A joint mirrors one other joint at most.
+  // Several joints may lie at one place, such as the joints of a lid in the middle of the eye.
+  // Their motions then tell the pairs. A joint mirrors at most one other joint.
   std::vector<bool> taken(joints.size(), false);
   for (std::uint32_t j = 0; j < joints.size(); ++j) {
     taken[j] = j < given.size() && given[j].mirrored != GivenJoint::kUnknown;
@@ -174,7 +174,7 @@ void pair_given(const Problem& problem, const std::vector<GivenJoint>& given,
   }
 }
 
-/// Which of the given joints alone comes nearest to what a vertex does, where that is near at all.
+/// Finds the given joint that alone matches a vertex's motion best, if it matches well.
 void find_nearest_given(Problem& problem, const std::vector<Joint>& joints) {
   problem.nearest_given.assign(problem.vertices, Mirror::kNone);
   core::parallel_for(problem.vertices, problem.threads, [&](std::size_t from, std::size_t to) {
@@ -224,7 +224,7 @@ void take_pivots(const std::vector<Pivot>& pivots, Problem& problem) {
       problem.pivots[i].mirrored = k;
       problem.pivots[k].mirrored = i;
     }
-    // What has no other side lies in the middle.
+    // A pivot without a counterpart lies in the middle.
     if (problem.pivots[i].mirrored == i && std::abs(problem.pivots[i].position.x()) < 0.02) {
       problem.pivots[i].position.x() = 0.0;
     }

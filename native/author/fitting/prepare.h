@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// From what a caller gives to a fit's own numbers. Private to native/author.
+// Converts the caller's arguments to the fit's own units. Private to native/author.
 #pragma once
 
 #include <cstddef>
@@ -11,18 +11,18 @@
 
 namespace risorius::author::detail {
 
-/// Fails: as fit_joints, whose words for the arguments the errors take.
+/// Fails: as fit_joints
 core::Status check(const Shapes& shapes, const FitOptions& options);
 
 /// The problem without its pivots. In: shapes, options  checked
 Problem make_problem(const Shapes& shapes, const FitOptions& options);
-/// The pivots in the fit's unit, each with that of the other side.
+/// The pivots in the fit's unit, each with the pivot of the other side.
 void take_pivots(const std::vector<Pivot>& pivots, Problem& problem);
-/// The given joints, and a head that rests where none of them does: all vertices are the head's.
-/// In: own  expressions without those that are added as mirrors
+/// The given joints. If none of them rests, a resting head is added, and it gets all vertices.
+/// In: own  number of expressions without the added mirrored ones
 /// Out: problem.nearest_given
 State start(Problem& problem, const std::vector<GivenJoint>& given, std::size_t own);
-/// Takes the weights to begin with. Fails: see fit_weights
+/// Sets the initial weights. Fails: see fit_weights
 core::Status take_start(const StartWeights& start, State& state);
 
 }  // namespace risorius::author::detail

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the steps of a fit share. Private to native/author.
+// Types that the steps of a fit share. Private to native/author.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,14 +15,14 @@ namespace risorius::author::detail {
 using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 
-/// The shapes in the fit's own unit (the size of the mesh is 1, its middle the origin).
+/// The shapes in the fit's own unit: the mesh has size 1, and its middle is the origin.
 struct Problem {
   std::size_t vertices = 0, expressions = 0, influences = 0, threads = 0;
   Vec3 middle = Vec3::Zero();
   double scale = 1.0;           // from the input's unit to the fit's
   std::vector<Vec3> positions;  // [V]
-  // [V][3][E], because most loops go over all expressions of one axis; mirrored expressions that
-  // were missing at the end
+  // [V][3][E], because most loops go over all expressions of one axis. Added mirrored expressions
+  // are at the end.
   std::vector<float> displacements;
   std::vector<std::uint32_t> first_neighbour, neighbours;  // of vertices, as rows of a CSR matrix
   std::vector<double> motion;  // [V] root of the summed squares of its displacements
@@ -34,34 +34,35 @@ struct Problem {
     std::size_t mirrored = 0;       // the pivot of the other side, itself in the middle
   };
   std::vector<Pivot> pivots;
-  bool to_pivots = false;  // whether joints are placed there already
+  bool to_pivots = false;  // whether joints lie at their pivots already
   double smoothness = 0.0;
-  /// What weights changed by goes on by this share: rounds that follow each other mostly go one
-  /// way.
+  /// The share of the last change by which weights continue, because consecutive rounds mostly go
+  /// the same way.
   double momentum = 0.0;
   std::size_t near = 5;            // joints that a vertex tries because they are near
-  std::vector<double> importance;  // [V] of a vertex' squared error, mean 1
-  std::vector<double> asked;       // [V] of it, what the caller asked for
-  /// [V] the given joint that alone comes nearest to what the vertex does, or Mirror::kNone.
+  std::vector<double> importance;  // [V] weight of a vertex's squared error, mean 1
+  std::vector<double> asked;       // [V] the part of `importance` that the caller gave
+  /// [V] the given joint that alone matches the vertex's motion best, or Mirror::kNone.
   std::vector<std::uint32_t> nearest_given;
 
   const float* of_vertex(std::size_t v) const { return displacements.data() + v * expressions * 3; }
   bool is_representative(std::size_t v) const { return mirror.empty() || mirror.vertices[v] >= v; }
 };
 
-/// How a joint in an expression moves a vertex p: matrix * (p, 1), without p itself.
+/// Displacement of a vertex p by a joint in an expression: matrix * (p, 1), without p itself.
 using Affine = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
 struct Joint {
   Vec3 position = Vec3::Zero();
-  Vec3 place = Vec3::Zero();  // the middle of what it moves: its position, if that is no pivot
+  Vec3 place = Vec3::Zero();  // the middle of its vertices; equals position unless that is a pivot
   std::uint32_t mirrored = 0;
   bool rests = false;              // no expression moves it
-  bool given = false;              // it stays where it is and moves as it did
+  bool given = false;              // position and motions are fixed
   std::vector<Mat3> rotations;     // [E]
   std::vector<Vec3> translations;  // [E]
-  std::vector<Affine> motions;     // [E] of the two above
-  std::vector<bool> idle;          // [E] it takes no part in the expression; empty: in all of them
+  std::vector<Affine> motions;     // [E] computed from the two above
+  // [E] the joint takes no part in the expression; empty: it takes part in all.
+  std::vector<bool> idle;
 
   bool is_idle(std::size_t expression) const { return !idle.empty() && idle[expression]; }
 };
@@ -73,24 +74,26 @@ struct Influence {
 
 struct State {
   std::vector<Joint> joints;
-  std::vector<std::vector<Influence>> weights;  // [V] by joint's number
-  std::vector<std::vector<Influence>> solved;   // [V] what they were before they went on; or empty
+  std::vector<std::vector<Influence>> weights;  // [V] sorted by joint
+  // [V] the weights before momentum was added; may be empty.
+  std::vector<std::vector<Influence>> solved;
 };
 
-/// Best weights for the motions that there are; with momentum, ahead of them.
+/// The best weights for the present motions, plus momentum if it is set.
 void solve_weights(const Problem& problem, State& state);
-/// Best motions for the weights that there are.
-/// In: left  what remains of the displacements, see find_residual
+/// The best motions for the present weights.
+/// In: left  the residual of find_residual
 void solve_motions(const Problem& problem, State& state, std::vector<float>& left);
-/// Joints leave the expressions in which they move no vertex by `least`, for good.
+/// Removes each joint for good from the expressions in which it moves every vertex by less than
+/// `least`.
 void leave_expressions(const Problem& problem, State& state, double least);
-/// Out: [V][3][E] displacements less what the joints do
+/// Out: [V][3][E] displacements minus the joints' part
 void find_residual(const Problem& problem, const State& state, std::vector<float>& left);
-/// Joints where the given ones leave most, until there are `count`.
+/// Adds joints where the present ones leave the largest error, until there are `count`.
 void add_joints(const Problem& problem, State& state, const std::vector<float>& left,
                 std::size_t count);
-/// Joints' neutral positions to the middle of what they move, or to the pivot of the expressions
-/// that they mostly move in; the given ones are left alone.
+/// Moves the neutral position of each joint to the middle of its vertices, or to the pivot of the
+/// expressions in which it mostly moves. Given joints stay.
 void move_joints(const Problem& problem, State& state);
 
 void rest(Joint& joint, std::size_t expressions);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Weights of each vertex for given motions: least squares with weights that are not negative and
-// sum to 1, of which at most K are not 0 (active sets, after Lawson and Hanson 1974).
+// sum to 1, at most K of them not 0 (active sets, after Lawson and Hanson 1974).
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
@@ -12,14 +12,15 @@ namespace risorius::author::detail {
 
 namespace {
 
-constexpr int kCandidates = 22;  // joints that are tried in all
-constexpr double kLeast = 1e-4;  // a smaller weight is none
-// Of the weight that a vertex is drawn to, its own share, the rest its neighbours': without it
-// momentum would make neighbours swing against each other. Tried from 0 to 0.7.
+constexpr int kCandidates = 22;  // joints that a vertex tries at most
+constexpr double kLeast = 1e-4;  // smaller weights are dropped
+// The smoothness goal of a vertex is this share of its own weights and the rest of its neighbours'
+// mean. Without its own share momentum would make neighbours swing against each other. Tried from 0
+// to 0.7.
 constexpr double kOwn = 0.4;
-constexpr double kLeastOnward = 0.1;  // of a weight is left where it goes on towards 0
+constexpr double kLeastOnward = 0.1;  // share of a weight that momentum leaves at least
 
-// At most kCandidates rows: they need no memory of their own.
+// At most kCandidates rows, so that Eigen allocates no memory.
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kCandidates, kCandidates>;
 using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kCandidates, 1>;
 using Products = std::array<double, 10>;  // of two joints: symmetric part of sum_e Y^T Z
@@ -40,7 +41,7 @@ double at(const Products& m, const Vec3& p) {
          m[8] * p.y() + m[9] * p.z();
 }
 
-/// Products of the pairs of joints that some vertex has to compare.
+/// Products of the pairs of joints that some vertex compares.
 class Pairs {
  public:
   Pairs(const State& state, const std::vector<std::vector<Influence>>& candidates,
@@ -75,7 +76,7 @@ class Pairs {
   std::vector<Products> values_;
 };
 
-/// Joints that a vertex may hang on, and what its neighbours' mean weight is.
+/// The joints that a vertex tries, each with the mean weight of the vertex's neighbours.
 std::vector<Influence> candidates_of(const Problem& problem, const State& state, std::size_t v) {
   std::vector<double> mean(state.joints.size(), 0.0), score(state.joints.size(), -1.0);
   std::vector<std::uint32_t> found;
@@ -86,7 +87,7 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
     }
     score[j] += add;
   };
-  // One that rests is enough: there may be more of them than joints that are tried.
+  // One resting joint is enough: there may be more of them than candidates.
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     if (!state.joints[j].rests) continue;
     note(j, 100.0);
@@ -120,12 +121,12 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
   return out;
 }
 
-/// Least w' G w - 2 b' w with w >= 0 and sum w = 1.
+/// Minimises w' G w - 2 b' w with w >= 0 and sum w = 1.
 class Simplex {
  public:
   Simplex(Matrix gram, Column right) : gram_(std::move(gram)), right_(std::move(right)) {
-    // The sum is a row of its own, weighted so that it holds to rounding.
-    // What two joints that move alike share is split evenly, and rounding leaves it positive.
+    // Two joints that move alike get equal shares, and the small ridge keeps rounding from making
+    // one negative. The sum is a row of its own, weighted so heavily that it holds to rounding.
     gram_.diagonal().array() += 1e-7 * gram_.diagonal().maxCoeff();
     const double heavy = 1e4 * (gram_.diagonal().maxCoeff() + 1e-30);
     gram_.array() += heavy;
@@ -133,7 +134,7 @@ class Simplex {
     weights_ = Column::Zero(right_.size());
   }
 
-  /// In: start  positions that are tried first
+  /// In: start  candidates that are tried first
   void solve(const std::vector<int>& start) {
     passive_ = start;
     for (const int c : start) weights_[c] = 1.0 / static_cast<double>(start.size());
@@ -154,7 +155,7 @@ class Simplex {
     }
   }
 
-  /// Takes out what costs least until at most `count` are left.
+  /// Removes the cheapest candidates until at most `count` are left.
   void limit(std::size_t count) {
     while (passive_.size() > count) {
       const auto n = static_cast<Eigen::Index>(passive_.size());
@@ -191,7 +192,7 @@ class Simplex {
     return out;
   }
 
-  /// The optimum of the passive set, of which those leave that would be negative.
+  /// The optimum of the passive set; candidates that would become negative leave it.
   void inner() {
     while (!passive_.empty()) {
       const auto n = static_cast<Eigen::Index>(passive_.size());
@@ -285,7 +286,8 @@ std::vector<Influence> mirrored(const State& state, std::vector<Influence> row) 
   return row;
 }
 
-/// A row of the middle as its own mirror: the mean of both, of at most `count` joints.
+/// Makes the row of a vertex in the middle symmetric: the mean of it and its mirror, of at most
+/// `count` joints.
 std::vector<Influence> balanced(const State& state, const std::vector<Influence>& row,
                                 std::size_t count) {
   std::vector<Influence> both = row;
@@ -298,7 +300,7 @@ std::vector<Influence> balanced(const State& state, const std::vector<Influence>
     }
     same->weight = (same->weight + i.weight) / 2;
   }
-  for (Influence& b : both) {  // those that only the row itself had
+  for (Influence& b : both) {  // joints that only the row itself has
     const bool other = std::any_of(row.begin(), row.end(), [&](const Influence& i) {
       return state.joints[i.joint].mirrored == b.joint;
     });
@@ -313,7 +315,7 @@ std::vector<Influence> balanced(const State& state, const std::vector<Influence>
     if (std::abs(a.weight - b.weight) > 1e-12) return a.weight > b.weight;
     return pair(a) < pair(b) || (pair(a) == pair(b) && a.joint < b.joint);
   });
-  while (both.size() > count) {  // both of a pair or none
+  while (both.size() > count) {  // a joint and its mirror leave together
     const std::uint32_t last = both.back().joint, other = state.joints[last].mirrored;
     both.pop_back();
     if (other != last) {
@@ -335,7 +337,7 @@ double weight_of(const std::vector<Influence>& row, std::uint32_t joint) {
   return found == row.end() ? 0.0 : found->weight;
 }
 
-/// A row further on the way that it went since the round before.
+/// Continues a row in the direction in which it went since the round before.
 std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Influence>& before,
                               double momentum) {
   double sum = 0.0;
@@ -348,7 +350,7 @@ std::vector<Influence> onward(std::vector<Influence> row, const std::vector<Infl
   return row;
 }
 
-/// Lets weights go on from what was solved (Nesterov 1983), both sides alike.
+/// Adds momentum to the solved weights (Nesterov 1983), on both sides alike.
 void go_on(const Problem& problem, State& state, std::vector<std::vector<Influence>> solved) {
   state.weights = solved;
   if (!state.solved.empty()) {

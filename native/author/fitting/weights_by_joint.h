@@ -9,7 +9,7 @@
 
 namespace risorius::author::detail {
 
-/// The weights by joint.
+/// The weights sorted by joint.
 struct ByJoint {
   struct Entry {
     std::uint32_t vertex;

@@ -11,7 +11,7 @@ namespace risorius::bindings {
 
 namespace {
 
-/// One thread at a time evaluates a face. The lock is taken without the interpreter's.
+/// Only one thread at a time evaluates a face. The lock is taken without the interpreter lock.
 struct PyDirectFace {
   std::unique_ptr<rig::DirectFace> face;
   std::mutex lock;
@@ -83,7 +83,7 @@ void forget_meshes(PyDirectFace& face) {
   face.face->forget();
 }
 
-// Where vertices go: an array, which is kept, or (address, vertices).
+// The memory for vertices: an array, which is kept alive, or (address, vertices).
 float* target_argument(const py::handle& value, py::ssize_t vertices,
                        std::vector<py::object>& kept) {
   if (!py::isinstance<py::tuple>(value)) {
@@ -107,7 +107,7 @@ float* target_argument(const py::handle& value, py::ssize_t vertices,
   return reinterpret_cast<float*>(address);
 }
 
-/// What a call evaluates, and what keeps its memory meanwhile.
+/// The arguments of a call, and the objects that keep their memory alive.
 struct Request {
   std::vector<FacePtr> faces;
   std::vector<rig::FaceFrame> frames;
@@ -143,7 +143,7 @@ struct Request {
 
   const rig::FaceParts& parts(std::size_t f) const { return faces[f]->face->parts(); }
 
-  // {mesh: where its vertices go}
+  // {mesh: memory for its vertices}
   void add_targets(std::size_t f, const py::object& object) {
     if (!py::isinstance<py::dict>(object)) {
       throw py::value_error("targets: {mesh: array or (address, vertices)} was expected for each");
@@ -185,14 +185,14 @@ struct Request {
       all.push_back(face->face.get());
       locks.push_back(&face->lock);
     }
-    std::ranges::sort(locks);  // so that two calls do not wait for each other
+    std::ranges::sort(locks);  // sorted, so that two calls cannot deadlock
     const py::gil_scoped_release released;
     std::vector<std::unique_lock<std::mutex>> held;
     for (std::mutex* lock : locks) held.emplace_back(*lock);
     rig::evaluate_faces(all, frames, threads);
   }
 
-  // The meshes that were written.
+  // Lists the meshes that were written.
   py::tuple written(std::size_t f) const {
     py::list meshes;
     for (const rig::Target& t : frames[f].targets) {
@@ -238,7 +238,7 @@ py::list deform_faces(const std::vector<FacePtr>& faces, const py::sequence& joi
                                   {static_cast<py::ssize_t>(rig.joint_count), py::ssize_t{9}});
     pose.blend_shapes =
         vector_argument(py::object(blend_shapes[f]), "blend_shapes", rig.blend_shape_count);
-    // They are read alone.
+    // Only read here.
     request.frames[f].pose.joints = const_cast<float*>(pose.joints.data());
     request.frames[f].pose.blend_shapes = const_cast<float*>(pose.blend_shapes.data());
   }
@@ -253,35 +253,36 @@ py::list deform_faces(const std::vector<FacePtr>& faces, const py::sequence& joi
 void bind_direct(py::module_& m) {
   py::class_<PyDirectFace, FacePtr>(
       m, "DirectFace",
-      "A face whose meshes get finished vertices, from frame to frame: a mesh of which nothing "
-      "changed since it was written to the same memory is passed over.")
+      "A face whose meshes get finished vertices, frame by frame. A mesh is skipped if nothing "
+      "changed since it was written to the same memory.")
       .def(py::init(&make_face), py::arg("rig").none(false), py::arg("space").none(false),
            py::arg("chain").none(false), py::arg("rows"), py::arg("meshes"), py::kw_only(),
            py::arg("turned") = py::tuple(),
-           "rows int[n]: the bone of chain that each bone of space is; meshes: (Morph, base "
-           "float32[V, 3], Skin) each; turned int[t]: which bones of space get a frame's turns.")
+           "rows int[n]: the index in chain of each bone of space; meshes: (Morph, base float32[V, "
+           "3], Skin) each; turned int[t]: the bones of space that get a frame's turns.")
       .def_property_readonly("mesh_count",
                              [](const PyDirectFace& f) { return f.face->parts().meshes.size(); })
       .def("keep", &keep_channels, py::arg("location"), py::arg("rotation"), py::arg("scale"),
-           "What the chain's bones keep that are not in rows: [B, 3], [B, 4] w x y z, [B, 3]. "
-           "Nothing, before the first call.")
+           "Sets the transforms of the chain's bones that are not in rows: [B, 3], [B, 4] w x y z, "
+           "[B, 3]. They rest before the first call.")
       .def("set_base", &set_base, py::arg("mesh"), py::arg("base"),
-           "Other vertices, float32[V, 3], where no channel and no bone moves a mesh.")
+           "Replaces the vertices of a mesh before channels and bones, float32[V, 3].")
       .def("forget", &forget_meshes,
-           "The next frame writes every mesh: its memory may have changed.");
-  m.def("evaluate_faces", &evaluate_faces, py::arg("faces"), py::arg("raw"), py::arg("lods"),
-        py::arg("targets"), py::kw_only(), py::arg("turns") = py::none(), py::arg("anew") = false,
-        py::arg("threads") = 0,
-        "A frame of different faces -> [(Pose, meshes that were written)]. Of each face: raw "
-        "float32[R]; lod; {mesh: where its vertices go}: a C-contiguous float32[V, 3], or "
-        "(address, V) of such memory, which has to stay there until the call returns; turns "
-        "float32[t, 4] w x y z or None, multiplied from the left to what the turned bones keep. "
-        "threads 0: as many as the work is worth, at most all cores; the result is the same.");
+           "Makes the next frame write every mesh, for example because its memory changed.");
+  m.def(
+      "evaluate_faces", &evaluate_faces, py::arg("faces"), py::arg("raw"), py::arg("lods"),
+      py::arg("targets"), py::kw_only(), py::arg("turns") = py::none(), py::arg("anew") = false,
+      py::arg("threads") = 0,
+      "Evaluates one frame of several faces -> [(Pose, written meshes)]. For each face: raw "
+      "float32[R]; lod; {mesh: memory for its vertices}, a C-contiguous float32[V, 3] or (address, "
+      "V) of such memory, which must stay valid until the call returns; turns float32[t, 4] w x y "
+      "z or None, each multiplied from the left to the rotation of its bone. threads 0: as many as "
+      "the work is worth, at most all cores; the result does not depend on it.");
   m.def("deform_faces", &deform_faces, py::arg("faces"), py::arg("joints"), py::arg("blend_shapes"),
         py::arg("targets"), py::kw_only(), py::arg("turns") = py::none(), py::arg("anew") = false,
         py::arg("threads") = 0,
-        "The same from poses: joints float32[J, 9] and blend_shapes float32[C] of each -> [meshes "
-        "that were written].");
+        "The same from poses: joints float32[J, 9] and blend_shapes float32[C] of each face -> "
+        "[written meshes].");
 }
 
 }  // namespace risorius::bindings

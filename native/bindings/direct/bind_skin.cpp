@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What bones keep to matrices, and these to vertices.
+// Transforms of bones to matrices, and matrices to vertices.
 #include <functional>
 
 #include "bindings/numpy_arrays.h"
@@ -13,7 +13,7 @@ namespace {
 
 using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-// -1 is no parent, so `from_python`, which takes indices, does not do.
+// `from_python` takes only indices, and -1 means no parent.
 std::vector<std::int32_t> parents_argument(const py::object& object) {
   const py::array any = py::array::ensure(object);
   if (!any || any.ndim() != 1 ||
@@ -24,7 +24,7 @@ std::vector<std::int32_t> parents_argument(const py::object& object) {
   std::vector<std::int32_t> parents;
   for (py::ssize_t i = 0; i < wide.size(); ++i) {
     const std::int64_t parent = wide.data()[i];
-    // A parent that 32 bits cannot hold is no bone: make_joint_chain refuses the clamped number.
+    // make_joint_chain refuses the clamped number of a parent that does not fit 32 bits.
     parents.push_back(static_cast<std::int32_t>(
         std::clamp<std::int64_t>(parent, std::numeric_limits<std::int32_t>::min(),
                                  std::numeric_limits<std::int32_t>::max())));
@@ -106,30 +106,31 @@ py::array_t<float> evaluate_skin(const rig::Skin& skin, const py::object& points
 void bind_skin(py::module_& m) {
   py::class_<rig::JointChain, std::shared_ptr<rig::JointChain>>(
       m, "JointChain",
-      "The bones of an armature: what they keep to how each moves the skin. Each passes on all of "
-      "its motion, shear included.")
+      "Computes skinning matrices from the transforms of an armature's bones. A bone passes its "
+      "whole motion to its children, shear included.")
       .def(py::init(&make_chain), py::arg("parents"), py::arg("rest"),
            "parents int[B], -1: none, in any order; rest float[B, 4, 4] in the armature's space, "
-           "which have an inverse.")
+           "invertible.")
       .def_property_readonly("bone_count", &rig::JointChain::size)
       .def("evaluate", &evaluate_chain, py::arg("location"), py::arg("rotation"), py::arg("scale"),
            "float32 [B, 3], [B, 4] w x y z of any length, [B, 3] -> float32[B, 3, 4], pose times "
-           "the inverse of rest. What is not finite spoils its bone and those below it.");
-  py::class_<rig::Skin, std::shared_ptr<rig::Skin>>(
-      m, "Skin", "How much each bone holds of each vertex of a mesh.")
+           "the inverse of rest. A value that is not finite spoils its bone and the bone's "
+           "descendants.");
+  py::class_<rig::Skin, std::shared_ptr<rig::Skin>>(m, "Skin",
+                                                    "The weights of a mesh's vertices on bones.")
       .def(py::init(&make_skin), py::arg("vertex_count"), py::arg("offsets"), py::arg("bones"),
            py::arg("weights"), py::arg("bone_count"),
-           "offsets int[V + 1]: where a vertex's influences begin; bones int[N] below bone_count; "
+           "offsets int[V + 1]: the first influence of each vertex; bones int[N] below bone_count; "
            "weights float32[N], 0 or more, divided by the sum of their vertex. A vertex whose sum "
-           "is at most 0.0001 stays.")
+           "is at most 0.0001 stays in place.")
       .def_readonly("vertex_count", &rig::Skin::vertex_count)
       .def_readonly("bone_count", &rig::Skin::bone_count)
       .def_property_readonly("memory_bytes", &rig::Skin::memory_bytes)
       .def("evaluate", &evaluate_skin, py::arg("points"), py::arg("matrices"),
            py::arg("out") = py::none(), py::arg("simd") = py::none(),
-           "points float32[V, 3], matrices float32[B, 3, 4] of JointChain.evaluate -> "
-           "float32[V, 3], into out where it is given, which may be points. A matrix that is not "
-           "finite spoils the vertices that its bone has a weight of.");
+           "points float32[V, 3], matrices float32[B, 3, 4] of JointChain.evaluate -> float32[V, "
+           "3], written into out if given; out may be points. A matrix that is not finite spoils "
+           "the vertices that have a weight on its bone.");
 }
 
 }  // namespace risorius::bindings

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Pose of Python: arrays that an evaluation writes into.
+// The arrays of a Python Pose that an evaluation writes into.
 #pragma once
 
 #include "bindings/numpy_arrays.h"
@@ -11,7 +11,7 @@ struct PoseArrays {
   FloatArray joints, blend_shapes, animated_maps, controls;
 };
 
-/// Of one frame, not yet written.
+/// The arrays of one frame, uninitialised.
 inline PoseArrays new_pose(const rig::Rig& rig) {
   const auto n = [](std::uint32_t count) { return static_cast<py::ssize_t>(count); };
   return {FloatArray({n(rig.joint_count), n(rig.joint_stride)}),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The curves of a run of frames as bytes: what is chosen for each control, and the codes they
+// The curves of a run of frames as bytes: the form of each control, and the prefix codes that they
 // share.
 #pragma once
 
@@ -16,10 +16,10 @@ namespace risorius::clip {
 
 inline constexpr std::size_t kMostBlockFrames = 4096;
 
-// First byte of a block's curves, and of a coded curve that is none.
+// The first byte of a block's curves, and of a chunk that is stored instead of coded.
 inline constexpr std::uint8_t kCodedBlock = 0, kStoredBlock = 1, kStoredChunk = 0xFF;
 
-/// What the list of controls says of one, or of several that rest.
+/// The form of a control in the list of controls, or of several that rest.
 enum class PartKind : std::uint8_t { kZero, kConstant, kRepeated, kCoded };
 
 /// Curves [controls, frames] that lie `stride` values apart.
@@ -32,26 +32,27 @@ struct BlockCurves {
   }
 };
 
-/// Appends the block's bytes; never more than 1 + 4 * controls * frames.
-/// In: 1 to kMostBlockFrames frames.
+/// Appends the block's bytes, at most 1 + 4 * controls * frames.
+/// In: 1 to kMostBlockFrames frames
 void encode_curves(const BlockCurves& curves, Bytes& out);
 
-/// The curves of a block. Nothing is decoded before it is asked for.
+/// The curves of a block. A curve is decoded only when it is requested.
 class EncodedCurves {
  public:
-  /// Reads what lies where. bytes must outlive the result.
-  /// Fails: kInvalidValue, kTruncated; offset counts in bytes.
+  /// Reads the table of parts. bytes must outlive the result.
+  /// Fails: kInvalidValue, kTruncated; the offset counts in bytes
   static core::Result<EncodedCurves> open(View bytes, std::size_t controls, std::size_t frames);
 
   EncodedCurves(EncodedCurves&&) noexcept;
   EncodedCurves& operator=(EncodedCurves&&) noexcept;
   ~EncodedCurves();
 
-  /// Writes the frames of controls to out [controls.size(), frames], rows `stride` values apart.
-  /// Fails: kInvalidValue. In: controls of this block.
+  /// Writes the frames of controls to out [controls.size(), frames]; rows are `stride` values
+  /// apart.
+  /// Fails: kInvalidValue. In: controls of this block
   core::Status decode(std::span<const std::uint32_t> controls, float* out,
                       std::size_t stride) const;
-  /// Whether a control rests in the whole block; then value is its value.
+  /// Whether a control rests in the whole block. Out: value  its value, if it rests
   bool is_resting(std::size_t control, float& value) const {
     if (parts_[control].kind != Part::kConstant) return false;
     value = std::bit_cast<float>(parts_[control].bits);
@@ -65,7 +66,7 @@ class EncodedCurves {
     enum Kind : std::uint8_t { kConstant, kCoded, kStored } kind = kConstant;
     bool is_near_end = false;          // its bytes lie in tail_
     std::uint32_t bits = 0;            // of kConstant
-    std::size_t offset = 0, size = 0;  // of the others' bytes
+    std::size_t offset = 0, size = 0;  // of the bytes of the other kinds
   };
   EncodedCurves();
   bool read_tables(Cursor& in);

@@ -15,12 +15,12 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// What the next bits of a chunk mean, packed so that one load gives all.
-// bits 0-5    how many bits the code and what follows it have together
-// bit 6       a rest, bit 7: no code begins so
-// bits 8-11   length of the code, 16-20: how many bits follow it
-// bit 14      the error has another sign than the one before
-// bit 15      1 above the bits that follow
+// The meaning of the next bits of a chunk, packed into one word:
+// bits 0-5    number of bits of the code and its extra bits together
+// bit 6       a rest; bit 7: no code begins with these bits
+// bits 8-11   length of the code; 16-20: number of extra bits
+// bit 14      the error has the opposite sign of the one before
+// bit 15      the 1 above the extra bits
 // bits 24-27  the code of the next symbol
 using Entry = std::uint32_t;
 constexpr Entry kIsRest = 1u << 6, kIsNone = 1u << 7;
@@ -33,12 +33,12 @@ Entry entry_of(std::uint32_t symbol, std::uint32_t length, std::uint32_t next) {
 }
 
 constexpr std::size_t kTableSize = std::size_t{1} << kLongestCode;
-constexpr std::size_t kSpare = 8;  // bytes that a load may reach beyond a chunk
+constexpr std::size_t kSpare = 8;  // bytes that a load may read past a chunk
 
 class BitReader {
  public:
   BitReader(const std::uint8_t* bytes, std::size_t size) : bytes_(bytes), end_(8 * size) {}
-  // At least 57 bits, those behind the end are anything.
+  // At least 57 bits; bits behind the end are undefined.
   std::uint64_t peek() const {
     std::uint64_t word;
     std::memcpy(&word, bytes_ + (at_ >> 3), sizeof word);
@@ -59,11 +59,11 @@ std::uint32_t number_of(std::uint64_t word, Entry entry) {
   return static_cast<std::uint32_t>(below | std::uint64_t{entry >> 15 & 1} << extra);
 }
 
-// A curve on its way.
+// The state of a curve during decoding.
 template <int kOrder>
 class Lane {
  public:
-  // In: a coded chunk, behind which kSpare bytes can be read.
+  // In: a coded chunk, behind which kSpare bytes are readable
   Lane(const Entry* tables, View chunk, std::uint32_t* out, std::size_t frames)
       : tables_(tables),
         table_(tables),
@@ -76,7 +76,7 @@ class Lane {
   bool is_done() const { return out_ == end_; }
   bool is_whole() const { return bits_.is_at_end(); }
 
-  // Reads a value, or how long the last one rests. False when the bits mean neither.
+  // Reads a value, or the length of a rest. False if the bits are neither.
   bool step() {
     if (bits_.is_beyond()) [[unlikely]]
       return false;
@@ -115,7 +115,7 @@ class Lane {
   std::uint32_t sign_ = 0;  // of the last error that was not 0
 };
 
-// Out: every frame was there, and nothing more.
+// Out: true if the chunk held every frame and nothing more
 template <int kOrder>
 bool finish(Lane<kOrder>& lane) {
   while (!lane.is_done()) {
@@ -124,7 +124,7 @@ bool finish(Lane<kOrder>& lane) {
   return lane.is_whole();
 }
 
-// Two curves at once: while one waits for its table, the other goes on.
+// Decodes two curves in turns: while one waits for its table, the other continues.
 template <int kOrder>
 std::array<bool, 2> finish_both(Lane<kOrder> a, Lane<kOrder> b) {
   while (!a.is_done() && !b.is_done()) {
@@ -206,7 +206,7 @@ core::Status EncodedCurves::read_parts(Cursor& in, std::size_t controls) {
   return core::ok();
 }
 
-// Chunks at the very end are read from a copy, which has room behind it.
+// Chunks at the very end are read from a copy, which has spare bytes behind it.
 void EncodedCurves::keep_tail() {
   tail_begin_ = bytes_.size();
   for (Part& part : parts_) {
@@ -245,7 +245,7 @@ core::Result<EncodedCurves> EncodedCurves::open(View bytes, std::size_t controls
   return curves;
 }
 
-// A coded chunk of two, which wait for one another here when they are of the same kind.
+// A coded chunk that waits here for a second one of the same kind.
 struct EncodedCurves::Pending {
   std::size_t control = 0;
   View chunk;
@@ -257,7 +257,7 @@ core::Status EncodedCurves::refuse(std::size_t control, const char* message) con
               parts_[control].offset);
 }
 
-// Fills what needs no codes. Out: whether that was all.
+// Fills a control that needs no decoding. Out: false if it does
 core::Result<bool> EncodedCurves::fill(std::size_t control, float* out) const {
   const Part& part = parts_[control];
   if (part.kind == Part::kConstant) {

@@ -37,7 +37,7 @@ std::vector<Token> tokens_of(std::span<const float> curve) {
   return tokens;
 }
 
-// About the bits of tokens: codes as short as the symbols' own distribution allows.
+// Estimates the bits of tokens by the entropy of their symbols.
 double cost_of(const std::vector<Token>& tokens) {
   std::array<std::uint32_t, kMostSymbols> counts{};
   double bits = 0.0;
@@ -71,9 +71,9 @@ Coded best_tokens(std::span<const float> curve) {
   return best;
 }
 
-// The codes of a block.
+// The prefix codes of a block.
 struct Codes {
-  std::vector<std::uint8_t> bounds;  // the largest symbol of each code's predecessors but the first
+  std::vector<std::uint8_t> bounds;  // the largest preceding symbol of each code except the first
   std::vector<Code> codes;
 
   std::size_t after(std::uint32_t symbol) const {
@@ -92,7 +92,7 @@ Codes make_codes(const std::vector<Coded>& all) {
       if (token.symbol < kRest) ++values[token.symbol], ++total;
     }
   }
-  // Each code gets its share of the values to follow.
+  // Each code gets an equal share of the symbols that follow.
   const std::size_t wanted = std::clamp<std::size_t>(total / 250, 1, kMostCodes - 1);
   std::uint64_t seen = 0;
   for (std::uint32_t symbol = 0; symbol < kRest - 1; ++symbol) {
@@ -147,10 +147,10 @@ Bytes chunk_of(const Coded& coded, const Codes& codes) {
   return out;
 }
 
-// What a control is in a block.
+// The form of a control in a block.
 struct Choice {
   PartKind kind;
-  std::size_t index = 0;  // of the control that it repeats, or in the list of what is coded
+  std::size_t index = 0;  // of the control that it repeats, or in the list of coded curves
 };
 
 std::vector<Choice> choose(const BlockCurves& curves, std::vector<Coded>& coded) {
@@ -187,7 +187,7 @@ void put_part(Bytes& out, PartKind kind, std::uint64_t number) {
   put_count(out, number << 2 | static_cast<std::uint64_t>(kind));
 }
 
-// Which control is what; neighbours that rest alike share an entry.
+// Writes the form of each control; neighbours that rest at the same value share an entry.
 void put_parts(Bytes& out, const BlockCurves& curves, const std::vector<Choice>& choices,
                const std::vector<Bytes>& chunks) {
   for (std::size_t i = 0; i < choices.size();) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Little-endian numbers into a vector and out of a span that nobody has checked.
+// Writes little-endian numbers to a vector and reads them from untrusted bytes.
 #pragma once
 
 #include <bit>
@@ -22,7 +22,7 @@ void put(Bytes& out, T value) {
   out.insert(out.end(), first, first + sizeof value);
 }
 
-/// Seven bits a byte, the lowest first; the top bit says that more follow.
+/// Seven bits per byte, the lowest first; the top bit is set if more bytes follow.
 inline void put_count(Bytes& out, std::uint64_t value) {
   for (; value >= 0x80; value >>= 7) out.push_back(static_cast<std::uint8_t>(value | 0x80));
   out.push_back(static_cast<std::uint8_t>(value));
@@ -33,7 +33,8 @@ inline void put_text(Bytes& out, const std::string& text) {
   out.insert(out.end(), text.begin(), text.end());
 }
 
-/// How many bytes a text shares with the beginning of the one before it, then the rest of it.
+/// Appends the number of bytes that a text shares with the beginning of the text before it, then
+/// the rest.
 inline void put_next_text(Bytes& out, const std::string& before, const std::string& text) {
   std::size_t same = 0;
   while (same < before.size() && same < text.size() && before[same] == text[same]) ++same;
@@ -41,7 +42,7 @@ inline void put_next_text(Bytes& out, const std::string& before, const std::stri
   put_text(out, text.substr(same));
 }
 
-/// Reads one number after the other. After the first failure everything is zero or empty.
+/// Reads one number after the other. After the first failure every result is zero or empty.
 class Cursor {
  public:
   explicit Cursor(View bytes) : bytes_(bytes) {}

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the next value of a curve will be, with the same bits on every machine.
+// Predicts the next value of a curve, with the same bits on every machine.
 #pragma once
 
 #include <bit>
@@ -9,20 +9,21 @@
 
 namespace risorius::clip {
 
-/// Predictors continue the polynomial through the last 1 (order 0) to 5 (order 4) values.
+/// The predictor of order n continues the polynomial through the last n + 1 values.
 inline constexpr int kOrders = 5;
 
-/// Floats of ascending value as ascending integers; its own inverse.
+/// Maps the bits of a float to an integer so that ascending floats give ascending integers; its own
+/// inverse.
 inline std::uint32_t in_order(std::uint32_t bits) {
   return bits ^ static_cast<std::uint32_t>(static_cast<std::int32_t>(bits) >> 31) >> 1;
 }
 
-/// All ones for what is below 0, else 0.
+/// All ones if the difference is negative, otherwise 0.
 inline std::uint32_t sign_of(std::uint32_t difference) {
   return static_cast<std::uint32_t>(static_cast<std::int32_t>(difference) >> 31);
 }
 
-/// The last values of a curve, the newest first.
+/// The last values of a curve, newest first.
 template <int kOrder>
 class History {
  public:
@@ -33,13 +34,13 @@ class History {
     last_ = bits;
     if constexpr (kOrder > 0) values_[0] = std::bit_cast<float>(bits);
   }
-  /// The same as add(bits) n times.
+  /// Equals n calls of add(bits).
   void rest(std::uint32_t bits, std::size_t n) {
     for (std::size_t i = 0; i < n && i <= kOrder; ++i) add(bits);
   }
   std::uint32_t last() const { return last_; }
 
-  /// in_order of what is expected next.
+  /// in_order of the predicted value.
   std::uint32_t next() const {
     if constexpr (kOrder == 0) return in_order(last_);
     double p = 0.0;
@@ -47,7 +48,8 @@ class History {
     if constexpr (kOrder == 2) p = 3 * (v(0) - v(1)) + v(2);
     if constexpr (kOrder == 3) p = 4 * (v(0) + v(2)) - 6 * v(1) - v(3);
     if constexpr (kOrder == 4) p = 5 * (v(0) - v(3)) - 10 * (v(1) - v(2)) + v(4);
-    // 0 is predicted where processors could differ: beyond a float's range, for denormals and NaN.
+    // The prediction is 0 where processors could differ: beyond a float's range, for denormals and
+    // NaN.
     const double size = std::fabs(p);
     if (!(size >= 0x1p-60 && size <= 0x1p100)) return 0;
     return in_order(std::bit_cast<std::uint32_t>(static_cast<float>(p)));
@@ -60,8 +62,8 @@ class History {
   float values_[kOrder + 1] = {};
 };
 
-/// While an object of this class lives, the processor rounds and treats denormals as at the start
-/// of a process, whatever the host program has set.
+/// During the life of an object of this class, the processor rounds and treats denormals as at the
+/// start of a process, even if the host program has changed that.
 class DefaultArithmetic {
  public:
   DefaultArithmetic() {

@@ -17,7 +17,7 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// What a reader would refuse is not written.
+// Refuses sizes that a reader would refuse.
 core::Status check_sizes(const Head& head) {
   const Limits limits;
   if (head.names.size() > limits.controls || head.metadata.size() > limits.metadata) {
@@ -162,7 +162,8 @@ void Encoder::put_block(const float* curves, std::size_t stride, std::span<const
   if (frames > 0) encode_curves({curves, stride, head_.names.size(), frames}, out_);
   const auto size = static_cast<std::uint32_t>(out_.size() - begin - kBlockStart);
   std::memcpy(out_.data() + begin + 4, &size, sizeof size);
-  const std::uint64_t hash = core::xxh64(View(out_).subspan(begin));  // with 0 where it goes
+  // Computed with 0 in the place of the hash.
+  const std::uint64_t hash = core::xxh64(View(out_).subspan(begin));
   std::memcpy(out_.data() + begin + kBlockStart - kHashSize, &hash, sizeof hash);
   blocks_.push_back({written_ + begin, size, static_cast<std::uint32_t>(frames)});
   frames_ += frames;

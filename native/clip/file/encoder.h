@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Clips -> .rzc files, without a bit lost. FORMAT.md describes them.
+// Encodes clips as .rzc files, lossless. FORMAT.md describes the format.
 #pragma once
 
 #include <cstddef>
@@ -16,20 +16,20 @@ namespace risorius::clip {
 
 inline constexpr std::size_t kDefaultBlockFrames = 512;
 
-/// Turns frames into the bytes of a file, as they come.
+/// Encodes frames incrementally.
 class Encoder {
  public:
-  /// In: block_frames, 1 to 4096, that are compressed, and read again, together.
-  /// Fails: kInvalidArgument with the field; a name twice, a rate that is not above 0.
+  /// In: block_frames  1 to 4096: frames that are compressed and read together
+  /// Fails: kInvalidArgument with the field (a repeated name, a rate that is not above 0)
   static core::Result<Encoder> create(Head head, std::size_t block_frames = kDefaultBlockFrames);
 
-  /// In: frames [n, controls]; times [n] when the clip has them, else empty: finite and ascending.
+  /// In: frames [n, controls]; times [n] if the clip has them, else empty: finite and ascending
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { pending_.push_back(std::move(event)); }
-  /// All that was given is in the bytes; the encoder takes no more.
+  /// Encodes the remaining frames and the index; the encoder accepts no more.
   void finish();
 
-  /// The bytes that are ready and were not taken yet.
+  /// Removes and returns the finished bytes.
   Bytes take();
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_ + filled_; }
@@ -46,7 +46,7 @@ class Encoder {
   Head head_;
   std::size_t block_frames_ = 0, filled_ = 0;
   std::uint64_t frames_ = 0, written_ = 0;
-  std::vector<float> curves_;  // [controls, block_frames], of which filled_ are there
+  std::vector<float> curves_;  // [controls, block_frames], of which filled_ frames are valid
   std::vector<double> times_;
   double last_time_ = 0.0;
   std::vector<Event> pending_, events_;

@@ -14,7 +14,8 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// The name without some of its end, for one that has no room for more; whole characters of UTF-8.
+// The name without its last characters, to make room for a suffix; cuts only whole UTF-8
+// characters.
 std::filesystem::path shortened(const std::filesystem::path& path) {
   constexpr std::size_t kRoom = 12;
   std::u8string name = path.filename().u8string();
@@ -46,7 +47,7 @@ core::Result<FileWriter> FileWriter::create(const std::filesystem::path& path, H
   return writer;
 }
 
-// What an earlier recording left when it ended badly is never written over.
+// Never overwrites the remains of an interrupted recording.
 std::error_code FileWriter::open_part(const bytes::FileCalls& calls) {
   constexpr int kMostParts = 100;
   std::filesystem::path base = path_;
@@ -65,7 +66,7 @@ std::error_code FileWriter::open_part(const bytes::FileCalls& calls) {
   return error;
 }
 
-// What is written reaches the system, so that it outlives this process.
+// Hands finished bytes to the system, so that they outlive this process.
 core::Status FileWriter::write_ready() {
   const Bytes bytes = encoder_.take();
   if (const std::error_code error = file_->write(bytes)) return failure(part_, error);

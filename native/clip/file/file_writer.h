@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A clip that is written while it is recorded.
+// Writes a clip during its recording.
 #pragma once
 
 #include <filesystem>
@@ -11,8 +11,9 @@
 
 namespace risorius::clip {
 
-/// Writes frames to PATH.part as they come, each full block at once, and makes PATH of it when it
-/// is closed and on the disk. One that is not closed stays: Reader takes it with Ends::kMayBeCut.
+/// Writes each full block of frames to PATH.part at once. close() renames it to PATH when it is on
+/// the disk. A writer that is not closed leaves the .part file: Reader opens it with
+/// Ends::kMayBeCut.
 class FileWriter {
  public:
   /// Fails: kInvalidArgument as Encoder; kIoWrite with the system's reason.
@@ -20,18 +21,18 @@ class FileWriter {
       const std::filesystem::path& path, Head head, std::size_t block_frames = kDefaultBlockFrames,
       const bytes::FileCalls& calls = bytes::system_file_calls());
 
-  /// As Encoder. Fails also: kIoWrite.
+  /// As Encoder::append. Fails also: kIoWrite
   core::Status append(std::span<const float> frames, std::span<const double> times);
   void add(Event event) { encoder_.add(std::move(event)); }
-  /// Writes what is left and the index, and gives the file its name; a file of that name from
-  /// before is replaced. Fails: kIoWrite; then, and after an append that could not write, PATH is
-  /// left as it was, what was written stays in part(), and every later call fails with the same.
+  /// Writes the remaining frames and the index, and renames the file to PATH, replacing an existing
+  /// one. Fails: kIoWrite. Then, and after a failed append, PATH is unchanged, the written bytes
+  /// stay in part(), and every later call fails with the same error.
   core::Status close();
 
   bool is_open() const { return file_.has_value(); }
   const Head& head() const { return encoder_.head(); }
   std::uint64_t frame_count() const { return encoder_.frame_count(); }
-  /// Where the frames are while the file is open.
+  /// The file that holds the frames while the writer is open.
   const std::filesystem::path& part() const { return part_; }
 
  private:
@@ -42,7 +43,8 @@ class FileWriter {
   Encoder encoder_;
   std::filesystem::path path_, part_;
   std::optional<bytes::NewFile> file_;
-  core::Status trouble_ = core::ok();  // bytes are missing, so what would follow is no clip
+  // Set if bytes are missing, because a continued file would be no valid clip.
+  core::Status trouble_ = core::ok();
 };
 
 }  // namespace risorius::clip

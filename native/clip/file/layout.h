@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What of a .rzc file its writer and its reader must both know; see FORMAT.md.
+// The layout of a .rzc file as shared by writer and reader; see FORMAT.md.
 #pragma once
 
 #include <array>
@@ -18,16 +18,16 @@ inline constexpr std::uint32_t kBlockMark = 0x4B4C425A;  // "ZBLK"
 inline constexpr std::uint32_t kIndexMark = 0x5844495A;  // "ZIDX"
 inline constexpr std::uint32_t kEndMark = 0x444E455A;    // "ZEND"
 
-// magic, version, size of what follows; then that and its hash
+// magic, version, size of the body; the body and its hash follow
 inline constexpr std::size_t kHeadStart = 12;
-// mark, size of what follows the hash, frames, first frame (8), hash (8) of the others and what
-// follows
+// mark, size of the bytes behind the hash, frames, first frame (8), hash (8) of these fields and of
+// the bytes that follow
 inline constexpr std::size_t kBlockStart = 28;
-// offset of the index (8), its size, mark; then their hash: the file's last bytes
+// offset of the index (8), its size, mark; their hash is the end of the file
 inline constexpr std::size_t kEndSize = 24;
 inline constexpr std::size_t kHashSize = 8;
 
-// Times are 8-byte floats in order, as differences of differences.
+// Times are 8-byte floats mapped to ordered integers, stored as second differences.
 inline std::uint64_t time_in_order(std::uint64_t bits) {
   return bits ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(bits) >> 63) >> 1;
 }
@@ -42,7 +42,7 @@ inline void put_events(Bytes& out, const std::vector<Event>& events) {
   }
 }
 
-/// Nothing is reserved by a count that the bytes cannot hold.
+/// Reserves no memory for a count that the bytes cannot hold.
 inline std::vector<Event> get_events(Cursor& in) {
   std::vector<Event> events;
   const std::uint64_t count = in.count();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A clip frame by frame, as a rig takes it.
+// Plays a clip frame by frame to a rig.
 #pragma once
 
 #include <cstdint>
@@ -10,14 +10,16 @@
 
 namespace risorius::clip {
 
-/// Holds the block that a frame lies in, decoded: frames that follow cost a copy of what moves.
+/// Keeps the block of the last frame decoded, so that a following frame only costs a copy of the
+/// moving curves.
 class Player {
  public:
   explicit Player(Reader reader);
 
-  /// Values of all controls [controls], in the order of the clip's names, until the next call.
-  /// Fails: as Reader::read. Cost: a block is read, decoded and allocated when the frame lies in
-  /// another one than the frame before; else nothing is allocated.
+  /// Values of all controls [controls], in the order of the clip's names; valid until the next
+  /// call.
+  /// Fails: as Reader::read. Cost: reads, decodes and allocates when the frame lies in another
+  ///        block than the last one; otherwise allocates nothing
   core::Result<std::span<const float>> frame(std::uint64_t index);
 
   const Reader& reader() const { return reader_; }
@@ -26,10 +28,10 @@ class Player {
   core::Status load(std::size_t block);
 
   Reader reader_;
-  std::uint64_t begin_ = 0, end_ = 0;  // frames that are decoded
-  std::vector<std::uint32_t> moving_;  // controls that do not rest in them
+  std::uint64_t begin_ = 0, end_ = 0;  // the decoded frames
+  std::vector<std::uint32_t> moving_;  // controls that do not rest in these frames
   std::vector<float> curves_;          // [moving, frames]
-  std::vector<float> values_;          // of the frame
+  std::vector<float> values_;          // of the last frame
 };
 
 }  // namespace risorius::clip

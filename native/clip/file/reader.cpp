@@ -19,7 +19,7 @@ namespace {
 using core::ErrorCode;
 using core::fail;
 
-// The bytes from offset on; none when they are not all there.
+// The bytes from offset on, or nullopt if there are fewer.
 std::optional<Bytes> read_bytes(bytes::Source& source, std::uint64_t offset, std::uint64_t size) {
   if (offset > source.size() || size > source.size() - offset) return std::nullopt;
   Bytes bytes(static_cast<std::size_t>(size));
@@ -34,7 +34,7 @@ T number_at(View bytes, std::size_t offset) {
   return value;
 }
 
-// Out: the last bytes are the hash of the others.
+// Out: whether the last bytes are the hash of the others
 bool is_sealed(View bytes) {
   const std::size_t size = bytes.size() - kHashSize;
   return number_at<std::uint64_t>(bytes, size) == core::xxh64(bytes.first(size));
@@ -55,7 +55,7 @@ bool get_times(Cursor& in, std::size_t frames, std::vector<double>& times) {
 
 }  // namespace
 
-// A block as it was read: its curves point into its bytes.
+// A loaded block; its curves point into its bytes.
 struct Reader::Loaded {
   std::size_t block = 0;
   Bytes bytes;
@@ -98,7 +98,7 @@ core::Status Reader::read_head(const Limits& limits) {
   return read_names(View(*bytes).subspan(kHeadStart, size), limits);
 }
 
-// In: the head's body.
+// In: body  of the head
 core::Status Reader::read_names(View body, const Limits& limits) {
   Cursor in(body);
   const auto refuse = [&](ErrorCode code, std::string where, std::string message) {
@@ -122,7 +122,7 @@ core::Status Reader::read_names(View body, const Limits& limits) {
   std::uint64_t length = 0;
   for (std::uint64_t i = 0; i < controls && !in.failed(); ++i) {
     head_.names.push_back(in.next_text(head_.names.empty() ? "" : head_.names.back()));
-    // A name may repeat the one before in a few bytes: these, too, are counted.
+    // A name may repeat the one before in a few bytes: the decoded length counts.
     length += head_.names.back().size();
     if (length > limits.head_bytes) {
       return refuse(ErrorCode::kLimitExceeded, "head.names",
@@ -173,7 +173,7 @@ core::Status Reader::read_index() {
   return read_blocks(View(*bytes).first(length), offset);
 }
 
-// In: the index, which lies at offset.
+// In: index  the bytes at offset
 core::Status Reader::read_blocks(View index, std::uint64_t offset) {
   Cursor in(index);
   const auto refuse = [&](ErrorCode code, std::string message) {
@@ -202,7 +202,7 @@ core::Status Reader::read_blocks(View index, std::uint64_t offset) {
   return core::ok();
 }
 
-// Out: a whole block lies at offset and is loaded.
+// Out: whether a complete block lies at offset; then it is loaded
 bool Reader::take_block(std::uint64_t offset, Block& block) {
   const auto start = read_bytes(*source_, offset, kBlockStart);
   if (!start || number_at<std::uint32_t>(*start, 0) != kBlockMark) return false;
@@ -214,7 +214,7 @@ bool Reader::take_block(std::uint64_t offset, Block& block) {
   return is_whole;
 }
 
-// The blocks one after the other, without the index: up to the last whole one.
+// Reads the blocks one after the other without the index, up to the last complete one.
 void Reader::find_blocks() {
   blocks_.clear();
   starts_.assign(1, 0);
@@ -318,7 +318,7 @@ core::Status Reader::read_block(std::size_t index, std::uint64_t begin, std::uin
   if (count == frames) {
     RISORIUS_TRY(decode(controls, out, stride));
   } else {
-    // Room for all frames of a few controls, of which the wanted ones are kept.
+    // Decodes a few controls at a time and keeps only the wanted frames.
     constexpr std::size_t kAtOnce = 16;
     std::vector<float> curves(kAtOnce * frames);
     for (std::size_t i = 0; i < controls.size(); i += kAtOnce) {
@@ -351,7 +351,7 @@ core::Status Reader::may_read(std::uint64_t begin, std::uint64_t end,
     }
   }
   const std::uint64_t count = end - begin;
-  // A time is as large as two values.
+  // A time takes as much memory as two values.
   const std::uint64_t values = controls.size() + (head_.has_times ? 2 : 0);
   if (count > limits_.values / std::max<std::uint64_t>(values, 1)) {
     return fail(ErrorCode::kLimitExceeded, "frames",
@@ -370,7 +370,7 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
   for (std::uint64_t at = begin; at < end; ++next) {
     const auto block = static_cast<std::size_t>(next - 1);
     const std::uint64_t until = std::min(end, starts_[block + 1]);
-    if (until == at) continue;  // a block of events only
+    if (until == at) continue;  // a block with events only
     const auto done = static_cast<std::size_t>(at - begin);
     auto read = read_block(block, at, until, controls, out == nullptr ? nullptr : out + done,
                            static_cast<std::size_t>(count),
@@ -378,7 +378,8 @@ core::Status Reader::read(std::uint64_t begin, std::uint64_t end,
     if (!read) return read;
     if (out_times != nullptr && done > 0 && out_times[done] <= out_times[done - 1]) {
       return fail(ErrorCode::kInvalidValue, "blocks[" + std::to_string(block) + "].times",
-                  "times after those of the block before were expected", blocks_[block].offset);
+                  "times after the last time of the previous block were expected",
+                  blocks_[block].offset);
     }
     at = until;
   }

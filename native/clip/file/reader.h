@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// .rzc files -> clips, whole or piece by piece. FORMAT.md describes them.
+// Reads .rzc files, whole or in parts. FORMAT.md describes the format.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@
 
 namespace risorius::clip {
 
-/// What a file may ask for at most.
+/// Upper limits for a file.
 struct Limits {
   std::uint32_t controls = 1u << 16;
   std::uint64_t frames = std::uint64_t{1} << 32;
@@ -22,13 +22,13 @@ struct Limits {
   std::uint64_t values = std::uint64_t{1} << 29;  // in one read: controls * frames
 };
 
-/// How a file without a good end is taken: one that was cut while it was recorded.
+/// Whether a file without a valid end, such as an interrupted recording, is accepted.
 enum class Ends { kMustBeWhole, kMayBeCut };
 
-/// A file that is read piece by piece. Reading from several threads needs a Reader each.
+/// A file that is read in parts. Several threads need a Reader each.
 class Reader {
  public:
-  /// Reads the head and the index, no curve.
+  /// Reads the head and the index, but no curve.
   /// Fails: kNotClip, kUnsupportedGeneration, kTruncated, kInvalidValue, kLimitExceeded.
   static core::Result<Reader> open(std::unique_ptr<bytes::Source> source,
                                    Ends ends = Ends::kMustBeWhole, const Limits& limits = {});
@@ -36,24 +36,24 @@ class Reader {
   const Head& head() const { return head_; }
   std::uint64_t frame_count() const { return frames_; }
   const std::vector<Event>& events() const { return events_; }
-  /// Of the file that were read; more follow only where it was cut.
+  /// Bytes of the file that belong to the clip; more bytes follow only if the file was cut.
   std::uint64_t byte_count() const { return end_; }
   /// First frame of each block, and the frame behind the last.
   const std::vector<std::uint64_t>& block_starts() const { return starts_; }
 
-  /// What read() would refuse before it reads anything: to be asked before memory is made for it.
+  /// Fails if read() would refuse the range. Call it before allocating memory for the result.
   core::Status may_read(std::uint64_t begin, std::uint64_t end,
                         std::span<const std::uint32_t> controls) const;
 
-  /// Writes the curves of controls to out [controls.size(), end - begin], and with out_times the
-  /// times to it [end - begin]. A block that has been read last is not read again.
-  /// In: begin <= end <= frame_count(), controls below their number.
-  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead.
+  /// Writes the curves of controls to out [controls.size(), end - begin], and the times to
+  /// out_times [end - begin] unless it is null. The last block stays in memory for the next call.
+  /// In: begin <= end <= frame_count(), valid controls
+  /// Fails: kInvalidArgument, kLimitExceeded, kInvalidValue, kTruncated, kIoRead
   core::Status read(std::uint64_t begin, std::uint64_t end, std::span<const std::uint32_t> controls,
                     float* out, double* out_times);
 
-  /// Of a block's controls, those that rest, as their values in `values` [controls]; appends the
-  /// others to `moving`. Fails: as read.
+  /// Writes the values of a block's resting controls to `values` [controls], and appends the other
+  /// controls to `moving`. Fails: as read.
   core::Status resting(std::size_t block, std::span<float> values,
                        std::vector<std::uint32_t>& moving);
 

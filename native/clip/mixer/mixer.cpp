@@ -8,7 +8,7 @@ namespace risorius::clip {
 
 namespace {
 
-// Shares of a frame or of a repeat below this are what a division lost.
+// A smaller share of a frame or of a repeat is a rounding error.
 constexpr double kLost = 1e-9;
 
 double snapped(double x) noexcept {
@@ -73,7 +73,7 @@ LayerCurves::Place LayerCurves::place(double time) const noexcept {
   return {static_cast<std::size_t>(first), static_cast<float>(at - first)};
 }
 
-/// What Mixer plays of a layer at a time.
+/// The weight and the clip time of a layer at a time.
 struct Mixer::Moment {
   float weight;
   double clip_time;
@@ -104,11 +104,11 @@ bool Mixer::moment(const Layer& layer, double time, Moment& out) noexcept {
     out.clip_time = layer.warp.at(t);
   } else {
     const double length = (layer.last - layer.first) * layer.scale;
-    // The end itself is rounded: where times are large its turn would be lost.
+    // The end itself is rounded: at large times the last repeat would be lost.
     const double turns =
         t >= layer.end ? layer.repeat : std::min(snapped((t - layer.start) / length), layer.repeat);
     double part = turns - std::floor(turns);
-    // The end of the last turn is the end of the clip and not the beginning of one more.
+    // At the end of the last repeat the clip is at its end, not at its start.
     if (part == 0.0 && t > layer.start && turns >= layer.repeat) part = 1.0;
     const double way = part * (layer.last - layer.first);
     out.clip_time = layer.reverse ? layer.last - way : layer.first + way;

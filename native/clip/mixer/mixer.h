@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Layers of curves, reactions and exclusive controls -> the controls of one frame.
+// Mixes layers of curves, reactions and exclusive controls to the controls of one frame.
 #pragma once
 
 #include <cstddef>
@@ -16,46 +16,47 @@
 
 namespace risorius::clip {
 
-/// Curves in memory that the caller keeps.
+/// Curves in the caller's memory.
 struct CurvesView {
   std::span<const std::string> names;
   std::span<const float> values;  // [names, frames]
   std::size_t frame_count = 0;
-  double rate = 60.0;             // frames a second
+  double rate = 60.0;             // frames per second
   double start = 0.0;             // seconds
   std::span<const double> times;  // [frames], ascending seconds; empty: start + i / rate
 };
 
-/// How a layer meets what lies below it; v its value, b what is below, m its weight times its mask.
+/// How a layer is combined with the layers below it: v is its value, b the value below, m its
+/// weight times its mask.
 enum class Blend : std::uint8_t {
   kOverride,  // b * (1 - m) + v * m
   kAdditive,  // b + v * m
   kMax,       // b * (1 - m) + max(b, v) * m
 };
 
-/// What a layer does before its start and after its end.
+/// Behaviour of a layer before its start and after its end.
 enum class Extend : std::uint8_t {
-  kHold,         // both ends last
-  kHoldForward,  // nothing before, the end lasts
+  kHold,         // both ends are held
+  kHoldForward,  // nothing before the start; the end is held
   kNothing,
-  kRepeat,  // over and over, both ways
+  kRepeat,  // repeated before the start and after the end
 };
 
-/// Straight lines between points, held outside. One point is a constant.
+/// A polyline, constant outside of its points. One point is a constant.
 struct Line {
   std::vector<double> x, y;  // x ascending
   double at(double x) const noexcept;
 };
 
-/// The curves of a layer that a mixer has and its mask lets through, made ready to be played: frame
-/// by frame, in the mixer's order, what never changes kept apart. Immutable; layers and mixers
+/// The curves of a layer that the mixer has and the mask lets through, prepared for playing: frame
+/// by frame, in the mixer's order, with constant curves kept apart. Immutable; layers and mixers
 /// share it.
 class LayerCurves {
  public:
   /// In:    controls  the names of the mixer's controls
-  ///        curves    are copied
+  ///        curves    copied
   ///        mask      float[controls] in [0, 1], or empty: all 1
-  /// Fails: kInvalidLength, kInvalidValue, with the field.
+  /// Fails: kInvalidLength, kInvalidValue, with the field
   static core::Result<std::shared_ptr<const LayerCurves>> make(
       std::span<const std::string> controls, const CurvesView& curves, std::span<const float> mask);
 
@@ -66,7 +67,7 @@ class LayerCurves {
 
  private:
   friend class Mixer;
-  /// Neighbours in the mixer and here.
+  /// A run of controls that are consecutive both in the mixer and here.
   struct Run {
     std::uint32_t control, column, count;
   };
@@ -77,22 +78,22 @@ class LayerCurves {
   };
   struct Place {
     std::size_t first;
-    float part;  // of the way to the next frame
+    float part;  // share of the way to the next frame
   };
   struct Sorter;
   Place place(double time) const noexcept;
 
-  Channels moving_, constant_, zero_;  // zero_: constants that an additive layer need not add
+  Channels moving_, constant_, zero_;  // zero_: constants at 0, which an additive layer skips
   std::size_t control_count_ = 0, frame_count_ = 0;
   double rate_ = 60.0, start_ = 0.0;
   std::vector<double> times_;
 };
 
-/// A layer: curves, when and how much. Times in seconds; of the scene unless it says clip.
-/// Without a warp the clip's part [first, last] begins at start, lasts (last - first) * scale and
-/// is played repeat times; end is derived. With a warp its ends are start and end; scale, repeat
-/// and reverse are not read then, and a warp that falls plays backwards. Of a single frame nothing
-/// is played: it stands from start to end, by default always.
+/// A layer: its curves, their timing and their weight. Times are in seconds of the scene, clip
+/// times in seconds of the clip. Without a warp the clip's part [first, last] begins at start,
+/// lasts (last - first) * scale and is played repeat times; end is derived. With a warp the layer
+/// lasts from start to end; scale, repeat and reverse are ignored, and a descending warp plays
+/// backwards. A single frame is held from start to end, by default always.
 struct Layer {
   static constexpr double kAlways = std::numeric_limits<double>::infinity();
 
@@ -104,13 +105,13 @@ struct Layer {
   double first = 0.0, last = 0.0;  // clip time
   double scale = 1.0, repeat = 1.0;
   bool reverse = false;
-  Line warp;  // scene -> clip time; empty: none
+  Line warp;  // scene time -> clip time; empty: none
   double fade_in = 0.0, fade_out = 0.0;
   bool mute = false, solo = false;
 };
 
-/// Part of a reaction: controls that go the same way in time. The way up and the way down are
-/// x * x * (3 - 2 * x).
+/// Part of a reaction: controls that share one envelope. Attack and release follow x * x * (3 - 2 *
+/// x).
 struct ReactionPart {
   std::vector<std::uint32_t> controls;
   std::vector<float> weights;                                   // [controls], in [0, 1]
@@ -118,7 +119,7 @@ struct ReactionPart {
 };
 using Reaction = std::vector<ReactionPart>;
 
-/// While `by` are on, `of` are taken down: of *= 1 - amount * s, where s in [0, 1] is the highest,
+/// While `by` are on, `of` are reduced: of *= 1 - amount * s, where s in [0, 1] is the highest,
 /// lowest or mean value of `by`.
 struct Yield {
   enum class Measure : std::uint8_t { kMax, kMin, kMean };
@@ -127,26 +128,26 @@ struct Yield {
   float amount = 1.0f;
 };
 
-/// Two controls that undo each other: what both have is taken from both.
+/// Two controls that cancel each other: their common amount is subtracted from both.
 struct Opposites {
   std::uint32_t a, b;
 };
 
-/// A stack of layers, the reactions that were fired, and the rules of controls that exclude each
-/// other, for one face.
+/// A stack of layers, the fired reactions, and the rules of controls that exclude each other, for
+/// one face.
 ///
-/// Arithmetic, float32 unless it says otherwise, each operation rounded by itself:
+/// Arithmetic, float32 unless stated otherwise, each operation rounded separately:
 /// 1. out = base, or 0.
-/// 2. Layers, bottom to top. Times are doubles. t is the scene's time, brought into [start, end] as
-///    `extend` says or the layer is off; weight w = float(line(t) * min((t - start) / fade_in,
-///    (end - t) / fade_out, 1)), off at 0; clip time c: line(t) of the warp, or first + o / scale,
-///    reversed last - o / scale, where o = (t - start) mod ((last - first) * scale) and at the end
-///    of a whole number of repeats the end of the clip and not its start. Between frames
-///    v = a + (b - a) * part, and m = mask * w; see Blend.
-/// 3. Each reaction in the order of its place, each part with envelope e:
-///    r = strength * e * weight; out += (peak - out) * r where out < peak = min(high, 1). That is
-///    1 - (1 - out) * (1 - r), also where a control may be driven beyond 1.
-/// 4. Yields: all s from the values as they are, then all products. Then opposites:
+/// 2. Layers, bottom to top. Times are doubles. t is the scene's time, mapped into [start, end] by
+///    `extend`, or the layer is off. Weight w = float(line(t) * min((t - start) / fade_in,
+///    (end - t) / fade_out, 1)); the layer is off at 0. Clip time c: line(t) of the warp, or
+///    first + o / scale, reversed last - o / scale, where o = (t - start) mod ((last - first) *
+///    scale); at the end of a whole number of repeats it is the end of the clip, not its start.
+///    Between frames v = a + (b - a) * part, and m = mask * w; see Blend.
+/// 3. Each reaction in the order of set_reactions, each part with envelope e:
+///    r = strength * e * weight; out += (peak - out) * r if out < peak = min(high, 1). That is
+///    1 - (1 - out) * (1 - r), also for a control that may be driven beyond 1.
+/// 4. Yields: all s are computed before any control is reduced. Then opposites:
 ///    c = min(a, b); if c > 0: a -= c, b -= c.
 /// 5. Clamped to the range; NaN becomes its lower end.
 ///
@@ -155,7 +156,7 @@ class Mixer {
  public:
   /// In:    controls   names, each once
   ///        low, high  [controls], low <= high
-  ///        max_fired  reactions that are remembered at once
+  /// reactions that can be active at once
   /// Fails: kInvalidLength, kInvalidValue.
   static core::Result<Mixer> make(std::vector<std::string> controls, std::vector<float> low,
                                   std::vector<float> high, std::size_t max_fired = 256);
@@ -166,26 +167,26 @@ class Mixer {
   /// Replaces the layers. In: layers  bottom to top.
   /// Fails: kInvalidValue, with the layer's place and field; the old layers stay.
   core::Status set_layers(std::vector<Layer> layers);
-  /// Replaces the reactions and forgets what was fired.
+  /// Replaces the reactions and stops the fired ones.
   /// Fails: kInvalidIndex, kInvalidLength, kInvalidValue.
   core::Status set_reactions(std::vector<Reaction> reactions);
-  /// Replaces the rules of controls that exclude each other. In: controls that the mixer has.
+  /// Replaces the rules of controls that exclude each other. In: controls of the mixer
   /// Fails: kInvalidIndex, kInvalidValue.
   core::Status set_rules(std::vector<Yield> yields, std::vector<Opposites> opposites);
 
-  /// Fires a reaction. Where max_fired are remembered the one that ended first makes room.
+  /// Fires a reaction. If max_fired are active, it replaces the one that ended first.
   /// In:   reaction  below the number of reactions
   ///       time      seconds, finite
   ///       strength  in [0, 1]
-  /// Out:  false, and nothing happens, when none has ended by then
+  /// Out:  false, and nothing happens, if none has ended
   /// Cost: no allocation
   bool fire(std::size_t reaction, double time, float strength) noexcept;
   void clear_fired() noexcept { voice_count_ = 0; }
 
-  /// The controls at a time: a function of it, of the base and of what was fired.
+  /// The controls at a time. The result depends only on the time, the base and the fired reactions.
   /// In:    base  float[controls] or null: 0
   /// Out:   out   float[controls], may be base
-  /// Cost:  no allocation. Not for several threads at once: it has a workspace.
+  /// Cost:  allocates nothing. Not thread-safe, because it has a workspace
   void evaluate(double time, const float* base, float* out) noexcept;
 
  private:
@@ -208,7 +209,7 @@ class Mixer {
   std::vector<Reaction> reactions_;
   std::vector<double> durations_;  // of each reaction, seconds
   std::vector<Voice> voices_;
-  std::size_t voice_count_ = 0;  // of those, in use
+  std::size_t voice_count_ = 0;  // number of voices in use
   std::vector<Yield> yields_;
   std::vector<Opposites> opposites_;
   std::vector<float> factors_;  // workspace: one per yield

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a mixer is made of is checked here once, so that evaluation tests nothing.
+// Checks the parts of a mixer once, so that evaluation needs no checks.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -55,7 +55,7 @@ core::Status check(const CurvesView& curves, std::size_t controls, std::span<con
 
 }  // namespace
 
-/// Curves by the control that they drive, and the three kinds of them.
+/// Sorts curves by the controls that they drive, and into moving, constant and zero ones.
 struct LayerCurves::Sorter {
   struct Row {
     std::uint32_t control;

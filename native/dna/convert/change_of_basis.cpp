@@ -39,23 +39,23 @@ Matrix conjugated(const Basis& basis, const Matrix& r) {
   return out;
 }
 
-// The angles of R = Ri Rj Rk. The middle one comes from both its sine and its cosine: asin alone
-// would lose half of the digits near the pole.
+// The angles of R = Ri Rj Rk. The middle angle comes from both its sine and its cosine, because
+// asin alone loses half of the digits near gimbal lock.
 Vec3 angles_of(const Matrix& r, const std::array<std::size_t, 3>& order) {
   const auto [i, j, k] = order;
   const double parity = j == (i + 1) % 3 ? 1.0 : -1.0;
   const double cosine = std::hypot(r[i][i], r[i][j]);
   Vec3 out{};
   out[j] = std::atan2(-parity * r[i][k], cosine);
-  // Below this the outer angles are noise (1e-16 / 1e-9 is a float's rounding); only their sum or
-  // difference is known, and the first gets it.
+  // Below this cosine the outer angles are noise (1e-16 / 1e-9 is the rounding of a float). Only
+  // their sum or difference is known; the first angle gets it.
   if (cosine < 1e-9) {
     out[i] = std::atan2(-parity * r[k][j], r[j][j]);
   } else {
     out[i] = std::atan2(parity * r[j][k], r[k][k]);
     out[k] = std::atan2(parity * r[i][j], r[i][i]);
   }
-  // What cos(90 degrees) in double leaves of a zero; a row of a matrix would live on by it.
+  // cos(90 degrees) in double is not exactly 0; the rest would keep a row of a matrix alive.
   for (double& angle : out) {
     if (std::abs(angle) < 1e-14) angle = 0;
   }
@@ -103,7 +103,7 @@ Rotation::Rotation(const System& source, const System& target, const Basis& basi
     same_order_ = same_order_ && basis.to[from_[i]] == into_[i];
     to_radians_[i] = in * source.ext.rotation_sign[i];
     from_radians_[j] = target.ext.rotation_sign[j] / out;
-    // In a mirror a rotation about an axis that stays turns the other way.
+    // If the basis mirrors, a rotation about an unchanged axis turns the other way.
     factor_[i] = basis.determinant * basis.sign[i] * source.ext.rotation_sign[i] *
                  target.ext.rotation_sign[j] * unit_;
   }

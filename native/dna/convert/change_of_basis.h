@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Vectors and Euler angles from one coordinate system to another, in double precision.
-// Row vectors throughout: v' = v C and R' = transpose(C) R C, where C is a signed permutation.
+// Converts vectors and Euler angles from one coordinate system to another, in double. Row vectors
+// throughout: v' = v C and R' = transpose(C) R C, where C is a signed permutation.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace risorius::dna::detail {
 
 using Vec3 = std::array<double, 3>;
 
-/// All that a file says about how its numbers are meant.
+/// The conventions of a file's numbers.
 struct System {
   CoordinateSystem axes;
   DescriptorExt ext;
@@ -25,7 +25,7 @@ bool spans_space(const CoordinateSystem& axes);
 
 /// The matrix C: component i of the source becomes component to[i], times sign[i].
 struct Basis {
-  /// In: axes that span space.
+  /// In: axes that span space
   Basis(const CoordinateSystem& source, const CoordinateSystem& target);
 
   bool keeps_places() const { return to == std::array<std::size_t, 3>{0, 1, 2}; }
@@ -34,24 +34,25 @@ struct Basis {
 
   std::array<std::size_t, 3> to{0, 1, 2};
   Vec3 sign{1, 1, 1};
-  double determinant = 1;  // -1: the one is the other's mirror image
+  double determinant = 1;  // -1: one system is the mirror image of the other
 };
 
-/// Stored angles to stored angles.
+/// Converts stored angles to stored angles.
 class Rotation {
  public:
-  /// In: systems that make sense.
+  /// In: valid systems
   Rotation(const System& source, const System& target, const Basis& basis);
 
-  /// Angles change places, signs and unit, but do not mix.
+  /// Angles change place, sign and unit, but do not mix.
   bool same_order() const { return same_order_; }
   bool identity() const { return same_order_ && basis_.identity() && factor_ == Vec3{1, 1, 1}; }
-  /// What an angle about a source axis is multiplied by; true of any rotation if the order stays,
-  /// and otherwise of rotations about one axis.
+  /// The factor of an angle about a source axis. If the order stays it holds for any rotation,
+  /// otherwise for rotations about one axis.
   double factor(std::size_t source_axis) const { return factor_[source_axis]; }
   double unit() const { return unit_; }
 
-  /// Without same_order the middle angle comes to lie within 90 degrees; at its pole the last is 0.
+  /// Without same_order the middle angle ends within 90 degrees; in gimbal lock the last angle is
+  /// 0.
   Vec3 operator()(const Vec3& stored) const;
 
  private:

@@ -32,7 +32,7 @@ std::string item(const std::string& where, std::size_t i) {
 // Adding 0 turns -0 into 0.
 float rounded(double v) { return static_cast<float>(v + 0.0); }
 
-// ---- what to convert from and to
+// ---- source and target systems
 
 System system_of(const Dna& dna) {
   const Descriptor& d = dna.descriptor;
@@ -49,7 +49,7 @@ System system_of(const CoordinateTarget& target, System s) {
   return s;
 }
 
-// Errors name a field of the file, or an argument.
+// Errors name a field of the file or an argument.
 Status check_system(const System& s, bool of_file) {
   const ErrorCode code = of_file ? ErrorCode::kInvalidValue : ErrorCode::kInvalidArgument;
   const std::string d = of_file ? "descriptor." : "", e = of_file ? "descriptor_ext." : "";
@@ -150,7 +150,7 @@ constexpr std::size_t kAttributes = 9;  // tx ty tz rx ry rz sx sy sz
 
 bool is_rotation(std::size_t output) { return output % kAttributes / 3 == 1; }
 
-// The rotation rows that a group has for one joint.
+// The rotation rows of one joint in a group.
 struct RotationRows {
   static constexpr std::size_t kNone = static_cast<std::size_t>(-1);
   std::array<std::size_t, 3> rows{kNone, kNone, kNone};  // by axis
@@ -171,22 +171,22 @@ std::map<std::size_t, RotationRows> rotation_rows(const JointGroup& g, std::size
   return out;
 }
 
-// Rows that no LOD uses would come alive beside those that one does.
+// Rows that no LOD uses are ignored: converted together with used rows, they would become used.
 std::size_t used_rows(const JointGroup& g) {
   return g.lods.empty() ? g.output_indices.size() : *std::ranges::max_element(g.lods);
 }
 
-// A group in the making.
+// A group under construction.
 struct Rows {
   std::vector<std::size_t> outputs;
   std::vector<float> values;
 };
 
-// One row becomes one row: translations, scales, and angles whose order stays.
+// Converts one row to one row: translations, scales, and angles whose order stays.
 void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& out) {
   const std::size_t columns = g.input_indices.size(), output = g.output_indices[row];
   const std::size_t kind = output % kAttributes / 3, axis = output % 3;
-  double factor = 1;  // of scales: growing along an axis is growing along its opposite
+  double factor = 1;  // scales have no sign along an axis
   if (kind == 0) factor = c.basis.sign[axis] * c.unit;
   if (kind == 1) factor = c.rotation.factor(axis);
   out.outputs.push_back(output - axis + c.basis.to[axis]);
@@ -195,7 +195,7 @@ void move_row(const Conversion& c, const JointGroup& g, std::size_t row, Rows& o
   }
 }
 
-// Three rows become three, less those of zeros.
+// Converts three rotation rows to three; rows of zeros are dropped.
 void mix_rows(const Conversion& c, const JointGroup& g, const RotationRows& joint, Rows& out) {
   const std::size_t columns = g.input_indices.size();
   const std::size_t output = g.output_indices[joint.first], rx = output - output % 3;
@@ -258,7 +258,7 @@ Status convert_group(const Conversion& c, const std::string& where, JointGroup& 
   return ok();
 }
 
-// Whether a LOD cuts through the rotation rows of a joint.
+// Whether a LOD uses only some of a joint's rotation rows.
 bool cuts_rotation(const JointGroup& g) {
   for (const auto& [joint, rows] : rotation_rows(g, used_rows(g))) {
     for (const std::uint16_t n : g.lods) {
@@ -268,11 +268,11 @@ bool cuts_rotation(const JointGroup& g) {
   return false;
 }
 
-// What is known of a joint's rotation across the groups.
+// How the groups turn a joint.
 struct Turns {
   bool driven = false, split = false;
   std::size_t group = 0;
-  std::array<bool, 3> about{};  // in neutral or by a group
+  std::array<bool, 3> about{};  // by the neutral pose or by a group
 };
 
 std::vector<Turns> turns_of(const Dna& dna) {
@@ -294,7 +294,7 @@ std::vector<Turns> turns_of(const Dna& dna) {
   return out;
 }
 
-// Angles add up to one rotation in one order of axes and to another in another.
+// Warns of joints whose angles add up to different rotations in the two orders of axes.
 void warn_of_mixed_rotations(const Dna& dna, Warnings& warnings) {
   const auto& metadata = dna.joint_behavior_metadata.joint_representations;
   const std::string where = "behavior.joint_groups";
@@ -334,7 +334,7 @@ Status convert_joint_groups(const Conversion& c, Dna& dna) {
   return ok();
 }
 
-// ---- rotations that controls carry
+// ---- rotations in controls
 
 bool is_w(const std::vector<std::string>& raw_control_names, std::size_t control) {
   if (control >= raw_control_names.size()) return false;
@@ -342,8 +342,8 @@ bool is_w(const std::vector<std::string>& raw_control_names, std::size_t control
   return name.ends_with(".w") || name.ends_with(".qw");
 }
 
-// All distances but the Euclidean one are of quaternions; there the names tell, as everywhere in
-// the format.
+// All distance methods except the Euclidean one compare quaternions. For that one the control names
+// decide, as everywhere in the format.
 bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_control_names) {
   if (s.raw_control_indices.size() % 4 != 0) return false;
   if (s.distance_method != 0) return true;
@@ -353,7 +353,7 @@ bool takes_quaternions(const RbfSolver& s, const std::vector<std::string>& raw_c
   return true;
 }
 
-// The axis of a quaternion turns with the basis, and in a mirror it turns the other way.
+// Converts the axes of quaternions. If the basis mirrors, the sense of rotation is reversed.
 Array<float> converted_quaternions(const Basis& basis, const Array<float>& values) {
   std::vector<float> out(values.begin(), values.end());
   for (std::size_t i = 0; i + 3 < out.size(); i += 4) {
@@ -363,14 +363,14 @@ Array<float> converted_quaternions(const Basis& basis, const Array<float>& value
   return out;
 }
 
-// A twist about an axis is one about its opposite.
+// A twist about an axis equals a twist about the opposite axis.
 void convert_axis(const Basis& basis, std::uint16_t& axis) {
   if (axis < 3) axis = static_cast<std::uint16_t>(basis.to[axis]);
 }
 
 void convert_control_rotations(const Conversion& c, Dna& dna) {
   for (RbfSolver& s : dna.rbf_behavior.solvers) {
-    // The evaluation reads the radius in the rotation unit, whatever the distance.
+    // The evaluation reads the radius in the rotation unit for every distance method.
     if (c.rotation.unit() != 1) s.radius = rounded(c.rotation.unit() * s.radius);
     convert_axis(c.basis, s.twist_axis);
     if (c.basis.identity() || !takes_quaternions(s, dna.definition.raw_control_names)) continue;
@@ -380,7 +380,8 @@ void convert_control_rotations(const Conversion& c, Dna& dna) {
   for (TwistSwingSetup& s : dna.twist_swing_behavior.swings) convert_axis(c.basis, s.twist_axis);
 }
 
-// Tables and networks take the components of a rotation one by one, which no basis survives.
+// Warns if tables or networks read single components of a rotation, because no change of basis
+// preserves them.
 void warn_of_components(const Dna& dna, Warnings& warnings) {
   const auto check = [&](const char* where, const auto& controls) {
     for (const auto control : controls) {
@@ -404,7 +405,7 @@ void warn_of_components(const Dna& dna, Warnings& warnings) {
 
 // ---- networks that move joints
 
-// Their numbers stay; keys 3 to 9 name the system that they are meant in.
+// The numbers stay; keys 3 to 9 name the coordinate system that they refer to.
 void name_ml_system(const System& source, MlJoints& joints) {
   constexpr std::uint16_t kFirst = 3, kLast = 9;
   const auto& keys = joints.parameter_keys;
@@ -460,7 +461,7 @@ void warn_of_unknown_layers(const Dna& dna, Warnings& warnings) {
 }
 
 void set_system(const System& target, Dna& dna) {
-  // Only 2.8 has room for all of dsce.
+  // Only version 2.8 stores all fields of dsce.
   if (dna.descriptor_ext != target.ext && dna.version < 8) dna.version = 8;
   dna.descriptor.coordinate_system = target.axes;
   dna.descriptor.translation_unit = target.translation_unit;

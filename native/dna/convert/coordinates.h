@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A Dna in another coordinate system or other units.
+// Converts a Dna to another coordinate system or other units.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace risorius::dna {
 
-/// What stays nullopt stays as it is in the file.
+/// The target system. A field that is nullopt keeps the file's value.
 struct CoordinateTarget {
   std::optional<CoordinateSystem> axes;
   std::optional<std::uint32_t> rotation_sequence;             // 0 xyz 1 xzy 2 yxz 3 yzx 4 zxy 5 zyx
@@ -23,20 +23,20 @@ struct CoordinateTarget {
 };
 
 /// The same character in the target's axes, rotation order, signs, winding and units. Numbers are
-/// computed in double and rounded once; what only changes place and sign stays exact, and a target
-/// equal to the source changes no bit.
+/// computed in double and rounded once. Numbers that change only place and sign stay exact, and a
+/// target equal to the source changes no bit.
 ///
-/// Where the order of the rotation axes stays the same, each angle and each row of a joint group
-/// goes to one place, and every pose of the result is the converted pose. Otherwise a rotation
-/// becomes angles with the middle one within 90 degrees (at its pole the last one is 0), and the
+/// If the order of the rotation axes stays the same, each angle and each row of a joint group goes
+/// to one place, and every pose of the result is the converted pose. Otherwise a rotation becomes
+/// angles of which the middle one is within 90 degrees (in gimbal lock the last one is 0), and the
 /// rotation rows of a joint are converted together, column by column, as the reference does; rows
-/// that no LOD uses go. Scale deltas keep their sign.
+/// that no LOD uses are dropped. Scale deltas keep their sign.
 ///
-/// Raw controls that carry a rotation (inputs of RBF solvers, twists and swings) are meant in the
-/// new axes afterwards. Networks that move joints keep their numbers; the layer names their axes.
-/// Appends to warnings, by field, what the format cannot say in the new system.
-/// Fails: kInvalidArgument (the target makes no sense), kInvalidValue (the file's own system makes
-/// no sense, or a joint group would not fit the format), and as validate.
+/// Raw controls that carry a rotation (inputs of RBF solvers, twists and swings) refer to the new
+/// axes afterwards. Networks that move joints keep their numbers; the layer names their axes.
+/// In/out: warnings  gets an entry for each field that the format cannot express in the new system
+/// Fails: kInvalidArgument (an invalid target), kInvalidValue (the file's own system is invalid, or
+///        a joint group would not fit the format), and as validate
 core::Result<Dna> convert_coordinates(const Dna& dna, const CoordinateTarget& target,
                                       std::vector<Warning>& warnings);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The plan: which LODs stay, and the joints, channels, maps, meshes and networks that they use.
+// The plan: the kept LODs, and the joints, channels, maps, meshes and networks that they use.
 #include <algorithm>
 #include <optional>
 #include <string>

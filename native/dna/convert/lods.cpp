@@ -22,7 +22,7 @@ using core::PlanarArray;
 using core::Status;
 using Indices = std::vector<std::uint16_t>;
 
-// Looks indices up in their maps and remembers the first that is outside its space.
+// Looks indices up in their maps and remembers the first invalid one.
 class Lookup {
  public:
   bool keeps(const IndexMap& map, std::size_t index, const Where& where, const char* space) {
@@ -101,7 +101,7 @@ std::vector<bool> kept_of(const IndexMap& map) {
   return keep;
 }
 
-// The entries of a per-LOD list that stay.
+// The entries of a list with one entry per LOD, for the kept LODs.
 Array<std::uint16_t> cut_lods(const LodPlan& plan, const Array<std::uint16_t>& lods) {
   Indices out;
   for (const std::uint16_t lod : plan.lods) {
@@ -132,7 +132,7 @@ LodMapping cut_mapping(const LodPlan& plan, const LodMapping& mapping, const Ind
   }
   for (const std::uint16_t lod : plan.lods) {
     if (lod >= mapping.lods.size()) continue;
-    // A row that is not there stays one that is not there: validate names it.
+    // An invalid row stays invalid: validate names it.
     lods.push_back(static_cast<std::uint16_t>(has_row(lod) ? row_to[mapping.lods[lod]] : 65535));
   }
   out.lods = std::move(lods);
@@ -200,8 +200,8 @@ void apply_to_joint_group(const LodPlan& plan, const Where& where, Lookup& looku
   g.joint_indices = std::move(joints);
 }
 
-// Entries in order of LOD, each with an output index: the first lods[0] stay, without those whose
-// output is gone.
+// Entries in order of LOD, each with an output index: the first lods[0] entries are kept, without
+// entries whose output is dropped.
 std::vector<bool> kept_entries(const LodPlan& plan, const IndexMap& map,
                                const Array<std::uint16_t>& outputs, const Where& where,
                                const char* space, Lookup& lookup, Array<std::uint16_t>& lods) {
@@ -286,7 +286,7 @@ void apply_to_targets(const LodPlan& plan, const Where& where, Lookup& lookup, M
   if (std::ranges::find(keep, false) != keep.end()) select(m.blend_shape_targets, keep);
 }
 
-// Networks by number: what a LOD runs, and what the operations of mlbe name.
+// Renumbers the networks: those that a kept LOD runs, and those that operations of mlbe name.
 void apply_to_networks(const LodPlan& plan, Lookup& lookup, Dna& dna) {
   MachineLearnedBehavior& ml = dna.machine_learned_behavior;
   std::vector<bool> keep = needed(plan, ml.lod_neural_network_mapping, ml.neural_networks.size());
@@ -425,7 +425,7 @@ void apply_to_extensions(const LodPlan& plan, std::size_t lod_count, Lookup& loo
 
 }  // namespace
 
-// The channels' part of apply: entries of a channel that goes, go with it.
+// Drops channels together with their entries.
 Status drop_channels(const LodPlan& plan, std::vector<bool> entries, Dna& dna) {
   Lookup lookup;
   BlendShapeChannels& s = dna.behavior.blend_shape_channels;
@@ -499,7 +499,7 @@ Status apply(const LodPlan& plan, bool cut_while_reading, Dna& dna) {
 
 }  // namespace detail
 
-// A plan that keeps everything but channels.
+// Uses a plan that keeps everything except some channels.
 core::Result<Dna> remove_unreferenced_blend_shapes(const Dna& dna) {
   std::vector<Warning> unused;
   RISORIUS_TRY(validate(dna, unused));
@@ -557,7 +557,7 @@ core::Status check_parts(const Dna& dna, const std::vector<bool>& joints,
   return core::ok();
 }
 
-// Channels that are driven, and by correctives that go alone.
+// Channels that remain: a channel is dropped if only dropped correctives drive it.
 std::vector<bool> kept_channels(const Dna& dna, const std::vector<bool>& controls) {
   const BlendShapeChannels& s = dna.behavior.blend_shape_channels;
   std::vector<bool> keep(dna.definition.blend_shape_channel_names.size(), true);

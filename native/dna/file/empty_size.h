@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How many bytes an empty value takes in a file: the least that an element of a list can be.
+// The number of bytes of an empty value in a file, which is the smallest size of a list's element.
 #pragma once
 
 #include <cstdint>

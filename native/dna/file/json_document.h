@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A JSON text as a tree of values. Private to native/dna/file.
+// Parses a JSON text to a tree of values. Private to native/dna/file.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +18,24 @@ struct RepeatedMember {
   std::string name;
 };
 
-// An object that does not let a later member replace an earlier one: readers would differ in which
-// of them they take.
+// An object that rejects a repeated member, because readers differ in which of the two they use.
 template <class Key, class Value, class Less, class Allocator>
 struct UniqueMap : std::map<Key, Value, Less, Allocator> {
   using std::map<Key, Value, Less, Allocator>::map;
   Value& operator[](const Key& key) {
     const auto [at, added] = this->try_emplace(key);
-    // NOLINTNEXTLINE(bugprone-std-exception-baseclass): nobody but parse_document may catch it
+    // NOLINTNEXTLINE(bugprone-std-exception-baseclass): only parse_document may catch it
     if (!added) throw RepeatedMember{key};
     return at->second;
   }
 };
 
-// float as the type of numbers: read once, rounded once.
+// Numbers are read as float, so that they are rounded only once.
 using Json = nlohmann::basic_json<UniqueMap, std::vector, std::string, bool, std::int64_t,
                                   std::uint64_t, float>;
 
-/// Fails: kNotDna (not JSON, with the byte), kInvalidValue (a member that is there twice, a number
-/// beyond every float), kLimitExceeded.
+/// Fails: kNotDna (not JSON, with the byte), kInvalidValue (a repeated member, a number beyond
+///        float), kLimitExceeded
 core::Result<Json> parse_document(std::string_view text, const Limits& limits);
 
 }  // namespace risorius::dna::detail

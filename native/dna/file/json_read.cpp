@@ -34,7 +34,7 @@ using detail::json_name;
 using detail::layer_name;
 using detail::Name;
 
-// A visitor that takes members out of objects; the first error stays, with the path to it.
+// A visitor that reads the members of objects. It keeps the first error, with its path.
 class Reader {
  public:
   explicit Reader(const Limits& limits) : limits_(limits) {}
@@ -42,7 +42,7 @@ class Reader {
   core::Unexpected take_error() { return core::Unexpected{*error_}; }
 
   void error(const std::string& message, ErrorCode code = ErrorCode::kInvalidValue);
-  // Runs body with `json` as the object whose members fields are; every member must be used.
+  // Runs body with `json` as the object that holds the fields' members; every member must be used.
   void object(const Json& json, FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void(const Json&)> body);
   bool has(const std::string& name) const { return object_->contains(name); }
@@ -155,7 +155,7 @@ class Reader {
  private:
   void named(Name name, FunctionRef<void(const Json&)> body);
   bool is_list(const Json& json);
-  // Numbers come by the million: no path is kept for each until one is wrong.
+  // There are millions of numbers: their path is built only for a wrong one.
   template <class T>
   void append(const Json& json, std::vector<T>& out) {
     if (!is_list(json)) return;
@@ -185,7 +185,7 @@ void Reader::error(const std::string& message, ErrorCode code) {
     where += part;
   }
   std::optional<std::uint64_t> offset;
-  if (where.empty()) offset = 0;  // the text as a whole
+  if (where.empty()) offset = 0;  // the whole text
   error_ = core::Error{code, offset, where, message};
 }
 
@@ -364,7 +364,7 @@ Result<Dna> from_json(std::string_view text, const Limits& limits) {
   Result<Json> json = detail::parse_document(text, limits);
   if (!json) return std::move(json).propagate();
   Dna dna;
-  dna.descriptor.coordinate_system = {0, 0, 0};  // as in a file without this layer
+  dna.descriptor.coordinate_system = {0, 0, 0};  // a file without this layer has these values
   Reader r(limits);
   r.object(*json, [&] { read_layers(r, dna); });
   if (r.failed()) return r.take_error();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The words of the JSON, as it is written and read. Private to native/dna/file.
+// The names of members and layers in JSON, for reading and writing. Private to native/dna/file.
 #pragma once
 
 #include <charconv>
@@ -55,7 +55,7 @@ inline std::string to_hex(const void* data, std::size_t size) {
   return out;
 }
 
-/// Nothing where the text is no pairs of hex digits.
+/// Nullopt if the text is not pairs of hex digits.
 inline std::optional<std::string> from_hex(std::string_view text) {
   if (text.size() % 2 != 0) return std::nullopt;
   std::string out(text.size() / 2, '\0');

@@ -36,7 +36,7 @@ class Writer {
 
   void object(FunctionRef<void()> body);
   void member(const std::string& name, FunctionRef<void()> body);
-  // Members of an array on lines of their own (structs) or in a row (numbers).
+  // Writes an array with its members on lines of their own (structs) or in one line (numbers).
   template <class Items, class Each>
   void array(const Items& items, bool lines, Each each) {
     begin_array();
@@ -94,7 +94,7 @@ class Writer {
     char text[24];
     out_.append(text, std::to_chars(text, text + sizeof(text), v).ptr);
   }
-  // Signs are stored as u32; other tools of the format print them so.
+  // Signs are stored as u32, and other tools of the format print them so.
   void value(std::int32_t v) { value(static_cast<std::uint32_t>(v)); }
   void value(float v);
   void value(const std::string& v);
@@ -150,8 +150,8 @@ class Writer {
   bool first_ = true;
 };
 
-// What every field calls is no template and stands outside of the class: it is compiled once, not
-// once more for each of some 150 fields.
+// Functions that every field calls are not templates, so that they are compiled once and not for
+// each of about 150 fields.
 void Writer::object(FunctionRef<void()> body) {
   out_ += '{';
   ++depth_;

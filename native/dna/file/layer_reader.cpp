@@ -11,7 +11,7 @@ using core::ErrorCode;
 using core::List;
 using core::PlanarArray;
 
-// The planes are counted one by one in the file and must agree.
+// The file counts each plane; the counts must agree.
 template <std::size_t kPlanes>
 PlanarArray<kPlanes> LayerReader::planes() {
   const std::uint64_t first = r_.position();
@@ -56,7 +56,8 @@ std::vector<bool> LayerReader::wanted(const List<T>*, const LodMapping* mapping,
   return keep;
 }
 
-// What no kept LOD uses is passed over and leaves an empty element: apply() takes it out.
+// Reads a list and skips elements that no kept LOD uses: they stay empty until apply() removes
+// them.
 template <class T>
 void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
   const std::uint64_t layer_end = r_.end();
@@ -73,14 +74,15 @@ void LayerReader::sized(Name name, List<T>& v, const LodMapping* mapping) {
     Field item(r_, name.dna, i);
     const std::uint64_t at = r_.position();
     note(at);
-    if (plan != nullptr) r_.enter(at, std::min<std::uint64_t>(4, r_.left()));  // nothing behind it
+    // The element may be shorter than 4 bytes.
+    if (plan != nullptr) r_.enter(at, std::min<std::uint64_t>(4, r_.left()));
     const std::uint32_t mark = r_.u32();
     if (r_.failed()) break;
     const bool is_size = mesh_sizes || !std::is_same_v<T, Mesh>;
     const std::uint64_t end = is_size ? r_.position() + mark : mark;
     if (end < r_.position() || end > layer_end) {
       r_.fail_at(at, ErrorCode::kTruncated,
-                 "the element is said to end at byte " + std::to_string(end) +
+                 "the element claims to end at byte " + std::to_string(end) +
                      ", its layer ends at byte " + std::to_string(layer_end));
       break;
     }
@@ -133,8 +135,8 @@ void LayerReader::matrix(Name name, JointGroup& g) {
 
 namespace {
 
-// Makes room for `more` values of element i of n, and for those of all n when they go on like this;
-// never for more than the file has bytes for.
+// Reserves room for `more` values of element i of n, and extrapolates to all n elements, but never
+// beyond the bytes left in the file.
 template <class T>
 void extend(Buffer<T>& values, std::size_t more, std::uint32_t i, std::uint32_t n,
             std::uint64_t bytes_left) {
@@ -148,7 +150,7 @@ void extend(Buffer<T>& values, std::size_t more, std::uint32_t i, std::uint32_t 
 
 }  // namespace
 
-// Lists of lists become one flat list and offsets: no allocation per face or vertex.
+// Reads a list of lists as one flat list and offsets: no allocation per face or vertex.
 void LayerReader::faces(Mesh& m) {
   Field field(r_, "faces");
   note(r_.position());
@@ -203,7 +205,7 @@ void LayerReader::skin(Mesh& m) {
   m.skin_joint_indices = std::move(joints);
 }
 
-// The influences that stay of a vertex that was just read.
+// Cuts the influences of the vertex that was just read.
 std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     if (joints[i] < plan->joints.size() || r_.failed()) continue;
@@ -214,14 +216,14 @@ std::size_t LayerReader::cut_vertex(float* weights, std::uint16_t* joints, std::
   return r_.failed() ? 0 : cut_influences(*plan, weights, joints, n, &known.finite);
 }
 
-// A channel that is not there is read, so that the check of indices names it.
+// An invalid channel counts as wanted, so that the check of indices names it.
 bool LayerReader::channel_is_wanted(std::uint16_t channel) const {
   const IndexMap& channels = plan->blend_shape_channels;
   return channel >= channels.size() || channels.keeps(channel);
 }
 
-// The channel's number comes last: one look at where it is if the lists are as long as the first
-// says, and when it is not wanted a walk over them, as they really are.
+// Peeks at the channel index at the end of the target. If all lists are as long as the first, one
+// look is enough; if the channel is not wanted, the lists are skipped with their real lengths.
 bool LayerReader::target_is_wanted() {
   const std::uint64_t begin = r_.position();
   const auto go_back = [&] { return r_.enter(begin, r_.end() - begin); };
@@ -261,7 +263,8 @@ void LayerReader::targets(Mesh& m) {
 void LayerReader::add_place(const Place& place) { places->note(r_.where(), place); }
 
 std::optional<std::uint64_t> Places::find(std::string where) const {
-  std::optional<std::size_t> index;  // the first one that had to be cut off
+  // The index of the first element that had to be cut off the path.
+  std::optional<std::size_t> index;
   while (!where.empty()) {
     if (const auto at = places_.find(where); at != places_.end()) {
       const Place& p = at->second;

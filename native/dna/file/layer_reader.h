@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Layer bodies from bytes: a visitor of schema.h. Private to native/dna.
+// Reads layers from bytes: a visitor of schema.h. Private to native/dna.
 #pragma once
 
 #include <map>
@@ -17,15 +17,15 @@
 
 namespace risorius::dna::detail {
 
-/// Where a field's bytes begin in the file, for messages about its values.
+/// The position of a field in the file, for error messages about its values.
 struct Place {
-  std::uint64_t offset = 0;        // of the field, its count included
+  std::uint64_t offset = 0;        // of the field, including its count
   std::uint32_t element_size = 0;  // 0: not a list of numbers
-  std::uint32_t plane = 0;         // numbers in each plane of vectors, 0: no planes
+  std::uint32_t plane = 0;         // numbers in each plane of a vector list; 0: no planes
 };
 
-/// Notes only the fields that findings name, and what holds them: a place for each of a large
-/// file's fields would take many times its bytes.
+/// Records only the fields that findings name, and the fields around them: recording all fields of
+/// a large file would take many times its size.
 class Places {
  public:
   explicit Places(std::set<std::string> fields) : fields_(std::move(fields)) {}
@@ -33,7 +33,7 @@ class Places {
     const auto at = fields_.lower_bound(where);
     if (at != fields_.end() && at->starts_with(where)) places_.insert({where, place});
   }
-  /// Where an error about `where` (a field of validate) lies in the file.
+  /// The position in the file of an error about `where` (a field of validate).
   std::optional<std::uint64_t> find(std::string where) const;
 
  private:
@@ -46,9 +46,9 @@ class LayerReader {
   bool blend_shapes = true;
   bool mesh_sizes = true;  // 2.2+: a mesh is preceded by its size; 2.1: by the offset of its end
   const LodPlan* plan = nullptr;
-  const MachineLearnedBehaviorExt* operations = nullptr;  // read before the networks they name
+  const MachineLearnedBehaviorExt* operations = nullptr;  // read before the networks that they name
   Places* places = nullptr;
-  Known known{true, true};  // about what was read so far
+  Known known{true, true};  // facts about all numbers read so far
 
   explicit LayerReader(bytes::ByteReader& reader) : r_(reader) {}
 
@@ -121,7 +121,7 @@ class LayerReader {
   void faces(Mesh& m);
   void skin(Mesh& m);
   void targets(Mesh& m);
-  /// Remembers where the field that is being read begins.
+  /// Records the position of the field that is being read.
   void note(std::uint64_t at, std::uint32_t element_size = 0, std::uint32_t plane = 0) {
     if (places != nullptr) add_place({at, element_size, plane});
   }
@@ -186,7 +186,7 @@ class LayerReader {
   std::size_t cut_vertex(float* weights, std::uint16_t* joints, std::size_t n);
 
   bytes::ByteReader& r_;
-  std::uint32_t largest_ = 0;  // number in the uint32 list that was read last
+  std::uint32_t largest_ = 0;  // the largest number of the uint32 list that was read last
 };
 
 }  // namespace risorius::dna::detail

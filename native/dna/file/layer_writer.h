@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Layer bodies to bytes: a visitor of schema.h. Private to native/dna.
+// Writes layers to bytes: a visitor of schema.h. Private to native/dna.
 #pragma once
 
 #include <span>
@@ -90,7 +90,7 @@ class LayerWriter {
   void element(const T& v) {
     describe(*this, v);
   }
-  // A list of lists, from its flat form.
+  // Writes a list of lists from its flat form.
   template <class Item>
   void rows(const core::Array<std::uint32_t>& offsets, Item item) {
     const std::size_t n = offsets.empty() ? 0 : offsets.size() - 1;

@@ -30,7 +30,7 @@ struct IndexEntry {
   detail::LayerId id{};
   std::uint32_t version = 0, offset = 0, size = 0;
   const detail::KnownLayer* known = nullptr;
-  bool repeated = false;  // a known layer that was listed before
+  bool repeated = false;  // a known layer that the index listed before
 
   std::string name() const { return {id.begin(), id.end()}; }
   std::uint64_t end() const { return std::uint64_t{offset} + size; }
@@ -67,8 +67,8 @@ Status read_header(ByteReader& r, const Limits& limits, Dna& dna) {
   return core::ok();
 }
 
-// One pass over a file. With `findings` set (check), a layer that fails is reported and the next
-// one is read; otherwise the first error ends it.
+// One pass over a file. If `findings` is set (check), a failing layer is reported and the next one
+// is read; otherwise the first error ends the pass.
 class Parser {
  public:
   Parser(bytes::Source& source, const ParseOptions& options, detail::Places* places,
@@ -98,7 +98,7 @@ class Parser {
  private:
   using Body = void (Parser::*)();
 
-  // Reads one layer's body. False: there is no use in going on.
+  // Reads one layer. Out: false if reading cannot continue
   template <class Read>
   bool read(const char* name, std::uint64_t offset, std::uint64_t size, Read body) {
     if (r_.failed() || error_) return false;
@@ -120,7 +120,7 @@ class Parser {
     return [this, &layer] { describe(layer_, layer); };
   }
 
-  // The plan needs a definition without a wrong index.
+  // The plan needs a valid definition.
   void make_plan() {
     if (options_.lods.everything() || r_.failed() || error_) return;
     std::vector<Warning> unused;
@@ -137,7 +137,7 @@ class Parser {
     if (plan_) layer_.plan = &*plan_;
   }
 
-  // ---- 2.1: eight offsets, no index, an end mark that is worth a warning when it is missing
+  // ---- 2.1: eight offsets, no index; a missing end mark is only a warning
   void parse_sections() {
     layer_.mesh_sizes = false;
     const std::uint64_t file_end = r_.end();
@@ -147,7 +147,7 @@ class Parser {
       for (std::uint32_t& offset : offsets) offset = r_.u32();
     }
     std::vector<std::pair<std::uint64_t, std::uint64_t>> ranges{{0, r_.position()}};
-    // A section ends where another begins: reading ahead does not touch one that is not wanted.
+    // A section ends where the next one begins, so that unwanted sections are not read.
     const auto end_of = [&](std::uint64_t begin) {
       std::uint64_t end = std::max(begin, file_end);
       for (const std::uint64_t other : offsets) {
@@ -202,9 +202,9 @@ class Parser {
   void parse_indexed() {
     read_index();
     if (r_.failed() || error_) return;
-    // desc and defn first, wherever the index lists them: the others are read against them. mlbe
-    // before mlbh: its operations say which networks are needed.
-    dna_.descriptor.coordinate_system = {0, 0, 0};  // what a file without a descriptor says
+    // desc and defn first, wherever the index lists them, because the other layers refer to them.
+    // mlbe before mlbh, because its operations tell which networks are needed.
+    dna_.descriptor.coordinate_system = {0, 0, 0};  // the values of a file without a descriptor
     const bool go_on =
         known("desc", "descriptor", true, describe_into(dna_.descriptor)) &&
         known("dsce", "descriptor_ext", true, [this] { read_descriptor_ext(); }) &&
@@ -253,7 +253,7 @@ class Parser {
     order_index(at);
   }
 
-  // Overlaps would let a small file ask for its bytes again and again.
+  // Overlapping layers would let a small file claim the same bytes many times.
   void check_ranges(std::uint64_t index_end) {
     std::vector<std::size_t> order;
     for (std::size_t i = 0; i < entries_.size(); ++i) {
@@ -305,7 +305,7 @@ class Parser {
     const IndexEntry* e = wanted ? find(id) : nullptr;
     if (e == nullptr) {
       Field field(r_, name);
-      layer_.note(kIndexOffset);  // which does not list it
+      layer_.note(kIndexOffset);  // the position of the index that lacks the layer
       return true;
     }
     return read(name, e->offset, e->size, [&] {
@@ -317,14 +317,14 @@ class Parser {
     });
   }
 
-  // 16 bytes up to 2.7, 17 from 2.8 on, under one layer version: the size tells.
+  // 16 bytes up to 2.7, 17 from 2.8 on, under one layer version: only the size tells.
   void read_descriptor_ext() {
     const bool has_winding = r_.left() >= 17;
     describe(layer_, dna_.descriptor_ext);
     if (has_winding) layer_.field("face_winding_order", dna_.descriptor_ext.face_winding_order);
   }
 
-  // The control space counts what layers name that were not asked for: only their counts are read.
+  // Layers that are not loaded still count in the control space: only their counts are read.
   void count_unread_controls() {
     const auto names = [&](const char* id, bool loaded, std::uint32_t& count) {
       const IndexEntry* e = loaded ? nullptr : find(id);
@@ -346,7 +346,7 @@ class Parser {
     names("rbfe", options_.rbf_behavior, dna_.unread_controls.rbf_pose);
     const IndexEntry* rbfb = find("rbfb");
     if (options_.rbf_behavior || dna_.unread_controls.rbf_pose > 0 || rbfb == nullptr) return;
-    read("rbf_behavior", rbfb->offset, rbfb->size, [&] {  // 2.4: each pose is a control
+    read("rbf_behavior", rbfb->offset, rbfb->size, [&] {  // in 2.4 each pose is a control
       LodMapping mapping;
       layer_.field("lod_solver_mapping", mapping);
       const std::uint32_t solvers = r_.count(4);
@@ -396,7 +396,7 @@ Result<Dna> run_parser(bytes::Source& source, const ParseOptions& options, detai
   return dna;
 }
 
-// The same bytes once more, this time noting where each field lies: the price of an error.
+// Parses the bytes again and records the positions of fields, which only an error needs.
 Error with_offset(bytes::Source& source, const ParseOptions& options, Error error) {
   if (error.offset || error.code == ErrorCode::kInvalidArgument) return error;
   detail::Places places({error.where});
@@ -427,9 +427,9 @@ Result<Dna> parse(bytes::Source& source, const ParseOptions& options) {
   Result<Dna> dna = run_parser(source, options, known);
   if (!dna) return core::Unexpected{with_offset(source, options, dna.error())};
   if (Status valid = detail::validate(*dna, known, dna->warnings); !valid) {
-    // With a LOD filter the field's number counts what was kept, the file's bytes do not.
+    // With a LOD filter the field's index counts kept elements only and does not fit the file.
     if (!options.lods.everything()) return std::move(valid).propagate();
-    dna = std::move(valid).propagate();  // what was read goes before it is read again
+    dna = std::move(valid).propagate();  // free the first Dna before the second parse
     return core::Unexpected{with_offset(source, options, dna.error())};
   }
   if (!options.unreferenced_blend_shapes && options.definition) {
@@ -450,7 +450,8 @@ std::vector<Finding> check(bytes::Source& source, const Limits& limits) {
   for (const Warning& w : dna->warnings) {
     findings.push_back({false, {ErrorCode::kInvalidValue, w.offset, w.where, w.message}});
   }
-  // What could not be read is empty: indices into it would only repeat the error.
+  // A layer that could not be read is empty: errors about indices into it would only repeat the
+  // error.
   const bool whole = std::ranges::none_of(findings, &Finding::is_error);
   for (Finding& f : detail::find_all(*dna)) {
     if (!whole && f.error.code != ErrorCode::kInvalidValue) continue;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// bytes -> Dna.
+// Parses a DNA file.
 #pragma once
 
 #include <cstdint>
@@ -13,16 +13,16 @@
 
 namespace risorius::dna {
 
-/// What a file may ask for at most. Beside these every count is held against the bytes left.
+/// Upper limits for a file. In addition every count is checked against the bytes left.
 struct Limits {
-  std::uint64_t max_bytes = std::uint64_t{4} << 30;  // of the whole file: the format's own limit
+  std::uint64_t max_bytes = std::uint64_t{4} << 30;  // of the whole file; the format's own limit
   std::uint32_t max_layers = 4096;                   // entries of the index
-  std::uint32_t max_count = std::uint32_t{1} << 28;  // elements of any one list
+  std::uint32_t max_count = std::uint32_t{1} << 28;  // elements of one list
   std::uint32_t max_nesting = 32;                    // levels of JSON
 };
 
-/// What to read; the rest of the file is not touched. The descriptor is always read; the other
-/// layers need the definition, rbf_behavior the behavior as well.
+/// The layers to read; the rest of the file is not read. The descriptor is always read. The other
+/// layers need the definition, and rbf_behavior also needs the behavior.
 struct ParseOptions {
   bool definition = true;
   bool behavior = true;
@@ -32,21 +32,22 @@ struct ParseOptions {
   bool rbf_behavior = true;
   bool joint_behavior_metadata = true;
   bool twist_swing_behavior = true;
-  bool unknown_layers = true;             // layers of ids or versions that are not known
+  bool unknown_layers = true;             // layers with unknown ids or versions
   bool unreferenced_blend_shapes = true;  // false: see remove_unreferenced_blend_shapes
   LodSelection lods;
   Limits limits;
 };
 
-/// Reads a DNA file of generation 2, any minor version (dna-format: container and layers 2.1
-/// to 2.8; newer minors by the rules of 2.8). Fails: kNotDna, kUnsupportedGeneration, kTruncated,
-/// kInvalidCount, kInvalidLength, kInvalidIndex, kInvalidValue, kLimitExceeded, kIoRead,
-/// kInvalidArgument (LODs that are not there), each with the field and, except for the last, the
-/// byte offset. Cost: allocates at most a small constant times the bytes present.
+/// Reads a DNA file of generation 2, any minor version (dna-format: container and layers 2.1 to
+/// 2.8; newer minors by the rules of 2.8).
+/// Fails: kNotDna, kUnsupportedGeneration, kTruncated, kInvalidCount, kInvalidLength,
+///        kInvalidIndex, kInvalidValue, kLimitExceeded, kIoRead, kInvalidArgument (LODs that do not
+///        exist), each with the field and, except for the last, the byte offset
+/// Cost: allocates at most a small constant times the file's size
 core::Result<Dna> parse(bytes::Source& source, const ParseOptions& options = {});
 
-/// Everything that is wrong or odd in a file, in its order, each with field and byte offset. A
-/// layer that cannot be read does not hide the others.
+/// All errors and oddities of a file, in the order of the file, each with field and byte offset. A
+/// layer that cannot be read does not hide errors of the others.
 std::vector<Finding> check(bytes::Source& source, const Limits& limits = {});
 
 }  // namespace risorius::dna

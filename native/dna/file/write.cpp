@@ -65,13 +65,14 @@ std::vector<std::uint8_t> write_sections(const Dna& dna) {
   return w.take();
 }
 
-// A layer to write: a known one by its table entry, or unknown bytes.
+// A layer to write: a known one with its table entry, or unknown bytes.
 struct PlannedLayer {
   const detail::KnownLayer* known = nullptr;
   const UnknownLayer* unknown = nullptr;
 };
 
-// The layers in the order of the source's index, then what the version has and the source lacks.
+// The layers in the order of the source's index, then the layers of the version that the source
+// lacks.
 std::vector<PlannedLayer> plan_layers(const Dna& dna, const WriteOptions& options) {
   std::vector<PlannedLayer> plan;
   std::size_t next_unknown = 0;
@@ -94,7 +95,7 @@ std::vector<PlannedLayer> plan_layers(const Dna& dna, const WriteOptions& option
   for (const detail::KnownLayer& layer : detail::kLayers) {
     if (layer.since_minor <= options.minor) add_known(layer);
   }
-  // Content in a layer that neither the source's index nor the version has.
+  // Non-empty layers that are neither in the source's index nor in the version.
   detail::for_each_layer(dna, [&](std::string_view id, const char*, const auto& value) {
     if (value == std::remove_cvref_t<decltype(value)>{} || !options.newer_layers) return;
     for (const detail::KnownLayer& layer : detail::kLayers) {
@@ -131,12 +132,12 @@ std::vector<std::uint8_t> write_indexed(const Dna& dna, const WriteOptions& opti
   return w.take();
 }
 
-// 2.1 has the classic layers, though not under an index.
+// 2.1 has the layers of 2.2, though not in an index.
 bool holds(std::uint16_t minor, const detail::KnownLayer& layer) {
   return layer.since_minor <= std::max<std::uint16_t>(minor, 2);
 }
 
-// Layers with content that the version does not know.
+// Non-empty layers that the version does not know.
 std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   std::vector<std::string> ids;
   detail::for_each_layer(dna, [&](std::string_view id, const char*, const auto& value) {
@@ -148,7 +149,7 @@ std::vector<std::string> newer_layers(const Dna& dna, std::uint16_t minor) {
   return ids;
 }
 
-// One sentence for each layer that the version cannot hold, and whether its content is lost.
+// Warns of each layer that the version cannot hold, and tells whether its content is lost.
 void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
                     std::vector<Warning>& warnings) {
   const std::string version = "version 2." + std::to_string(options.minor);
@@ -168,7 +169,8 @@ void warn_of_losses(const Dna& dna, const WriteOptions& options, bool kept,
   }
 }
 
-// What the file will hold. Nothing when that is everything.
+// The face without the layers and controls that this version cannot store, or nullopt if the whole
+// face can be stored.
 Result<std::optional<Dna>> reduced(const Dna& dna, std::uint16_t minor, bool kept,
                                    std::vector<Warning>& warnings) {
   const std::vector<std::string> lost =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Dna -> bytes.
+// Writes a DNA file.
 #pragma once
 
 #include <cstdint>
@@ -12,18 +12,18 @@ namespace risorius::dna {
 
 struct WriteOptions {
   std::uint16_t minor = 8;  // file version 2.<minor>, 1 to 8
-  /// Layers that the version does not know (unknown ones and newer ones) are written all the same,
-  /// for readers that look for them; false leaves them out. 2.1 has no place for them.
+  /// Whether layers that the version does not know (unknown and newer ones) are written, for
+  /// readers that look for them. 2.1 has no place for them.
   bool newer_layers = true;
 };
 
-/// Serialises. Later versions than 2.1 get an empty layer of each kind that they know and that is
-/// missing, in the order of the source's index. Appends to warnings what the version cannot hold,
-/// by layer. What the controls of a layer drive that is left out or was not loaded goes with them,
-/// with a warning, so that the file is whole in itself. Rewriting a file for its own version gives
-/// its bytes.
-/// Fails: kInvalidArgument (another version; a network, pose or setup that needs such a control),
-/// kLimitExceeded (more than the format's 4 GiB), and as validate.
+/// Writes the bytes of a file. Versions after 2.1 get an empty layer for each known layer that is
+/// missing, in the order of the source's index. If a layer that provides controls was not loaded or
+/// cannot be written, everything that its controls drive is left out too, with a warning, so that
+/// the file is consistent. Rewriting a file in its own version gives the same bytes.
+/// In/out: warnings  gets an entry for each layer that the version cannot hold
+/// Fails: kInvalidArgument (an unknown version; a network, pose or setup that needs a dropped
+///        control), kLimitExceeded (more than the format's 4 GiB), and as validate
 core::Result<std::vector<std::uint8_t>> write(const Dna& dna, const WriteOptions& options,
                                               std::vector<Warning>& warnings);
 

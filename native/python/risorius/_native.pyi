@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# The names are those of the built module: tests/python/bindings/test_stub.py compares the two.
+# The names match the built module: tests/python/bindings/test_stub.py compares both.
 """The native part of Risorius: DNA files and rig evaluation."""
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class ClipError(RisoriusError):
     """The part of the clip, e.g. "blocks[3].times"."""
 
 class ClipFile:
-    """A .rzc file that is read in parts."""
+    """A .rzc file, read in parts."""
 
     def __init__(self, source: _Path, recover: bool = False) -> None: ...
     @property
@@ -62,10 +62,10 @@ class ClipFile:
     def read(
         self, begin: _Int, end: _Int, controls: Sequence[_Int] | None = None
     ) -> tuple[_F32, _F64 | None]:
-        """float32[controls, frames], and the times of the frames if they have any."""
+        """float32[controls, frames], and the times of the frames, or None."""
 
 class ClipFileWriter:
-    """A .rzc file that is being recorded."""
+    """A .rzc file during recording."""
 
     def __init__(
         self,
@@ -100,7 +100,7 @@ def encode_clip(
 def write_clip(path: _Path, bytes: bytes) -> None: ...
 
 class DnaError(RisoriusError):
-    """A DNA file or Dna value that cannot be used."""
+    """A DNA file or Dna value that is invalid."""
 
     code: str
     """E.g. "truncated"."""
@@ -110,7 +110,7 @@ class DnaError(RisoriusError):
     """The DNA field."""
 
 class LodMapping:
-    """For each LOD a list of indices; mapping[lod] is a uint16 array."""
+    """A list of indices per LOD; mapping[lod] is a uint16 array."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, lod: _Int) -> _U16: ...
@@ -151,7 +151,7 @@ class Conditionals:
     def cut_values(self, value: npt.ArrayLike) -> None: ...
 
 class Psds:
-    """Correctives as a sparse matrix: rows[i] is driven by columns[i] times values[i]."""
+    """Correctives as a sparse matrix: columns[i] drives rows[i] with weight values[i]."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> Psds: ...
@@ -330,7 +330,7 @@ class NeuralNetworkLayer:
     def activation_parameters(self, value: npt.ArrayLike) -> None: ...
 
 class NeuralNetwork:
-    """From control indices to control indices."""
+    """Control indices mapped to control indices."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> NeuralNetwork: ...
@@ -508,7 +508,7 @@ class RbfSolver:
     def twist_axis(self, value: _Int) -> None: ...
 
 class RbfPose:
-    """A pose's name and scale."""
+    """Name and scale of a pose."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> RbfPose: ...
@@ -539,7 +539,7 @@ class RbfBehavior:
     def poses(self, value: Iterable[RbfPose]) -> None: ...
 
 class RbfPoseControls:
-    """What a pose reads and writes."""
+    """Inputs and outputs of a pose."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> RbfPoseControls: ...
@@ -585,7 +585,7 @@ class JointBehaviorMetadata:
     def joint_representations(self, value: npt.ArrayLike) -> None: ...
 
 class TwistSwingSetup:
-    """Spreads the rotation of four controls (x y z w) over joints."""
+    """Distributes the rotation of four controls (x y z w) over joints."""
 
     def __init__(self, **fields: Any) -> None: ...
     def __copy__(self) -> TwistSwingSetup: ...
@@ -632,7 +632,7 @@ class Dna:
     def generation(self) -> int: ...
     @property
     def version(self) -> int:
-        """Minor version of the file it was read from: 8 is 2.8."""
+        """Minor version of the file that was read: 8 is 2.8."""
     name: str
     archetype: str
     gender: str
@@ -752,35 +752,36 @@ class Dna:
     joint_behavior_metadata: JointBehaviorMetadata
     twist_swing_behavior: TwistSwingBehavior
     def to_bytes(self, version: str = "2.8", unknown_layers: str = "preserve") -> bytes:
-        """The bytes of a file of this version. What the version cannot hold is a UserWarning by
-        layer: newer and unknown layers are written all the same (2.1 has no place for them), or
-        with unknown_layers='ignore' left out.
+        """The bytes of a file of this version. The version may not hold newer or unknown layers:
+        they are written with a UserWarning by layer (2.1 has no place for them), or left out with
+        unknown_layers='ignore'.
         """
     def save(self, path: _Path, version: str = "2.8", unknown_layers: str = "preserve") -> None:
-        """Writes the file; the old one is whole until the new one is."""
+        """Writes the file atomically: the old file stays until the new one is complete."""
     def to_json(self) -> str:
-        """The whole value as JSON with the format's own field names. Lossless: numbers are the
-        shortest that give the same bits back.
+        """The whole value as JSON with the format's own field names. Lossless: numbers have the
+        fewest digits that give the same bits back.
         """
     @staticmethod
     def from_json(text: str, limits: Limits = ...) -> Dna:
-        """What to_json wrote."""
+        """Reads the output of to_json."""
     @property
     def unknown_layers(self) -> list[tuple[str, str, bytes]]:
-        """Layers that this version does not know: (id, version, bytes)."""
+        """Layers unknown to this version: (id, version, bytes)."""
     @unknown_layers.setter
     def unknown_layers(self, value: Sequence[tuple[str, str, bytes]]) -> None: ...
     @property
     def layers(self) -> list[str]:
-        """Ids of the file's layers in its order."""
+        """Ids of the file's layers, in file order."""
     @property
     def warnings(self) -> list[str]: ...
     def validate(self) -> list[str]:
-        """The oddities that can be lived with. Raises DnaError for what cannot."""
+        """The tolerable oddities. Raises DnaError for an error."""
     def size_in_bytes(self) -> int:
-        """Bytes of its numbers and texts, as a file has them: what work on it is held against."""
+        """Bytes of its numbers and texts in a file, the basis of limits on work with it."""
     def filter_lods(self, lods: tuple[int, int] | Sequence[int] | None) -> Dna:
-        """A copy with (max_lod, min_lod) or [lod, ...] only; every index counts in what is left."""
+        """A copy with (max_lod, min_lod) or [lod, ...] only; all indices refer to the remaining
+        items."""
     def convert(
         self,
         *,
@@ -793,16 +794,16 @@ class Dna:
     ) -> Dna:
         """A copy in another coordinate system or other units, e.g. axes=('right', 'front', 'up'),
         rotation_sequence='xyz', rotation_signs=(1, 1, 1), face_winding_order='ccw',
-        translation_unit='m', rotation_unit='radians'; what is not given stays. Raw controls
-        that carry a rotation are meant in the new axes. What the format cannot say there is a
-        UserWarning. Raises ValueError for values that make no sense, DnaError where the file's
-        own do not.
+        translation_unit='m', rotation_unit='radians'; missing arguments keep the file's. Raw
+        controls with a rotation are interpreted in the new axes. A UserWarning names data that the
+        format cannot express. Raises ValueError for invalid values, DnaError if the file's own
+        values are invalid.
         """
     def __reduce__(self) -> tuple[Any, ...]: ...
 
 class Limits:
-    """What a file may ask for at most: bytes of the file, layers in its index, elements of any
-    list, levels of JSON.
+    """Limits on a file: bytes of the file, layers in its index, elements of any list, levels of
+    JSON.
     """
 
     def __init__(
@@ -846,7 +847,7 @@ class ParseOptions:
     def set_lods(self, lods: tuple[int, int] | Sequence[int] | None) -> None: ...
 
 class FileReplacement:
-    """A new file beside `path`, to be written under the name `temporary` and closed before commit()
+    """A new file beside `path`: write it under the name `temporary` and close it; commit() then
     puts it in the place of `path`."""
 
     def __init__(self, path: _Path, sweep: bool = True) -> None: ...
@@ -856,15 +857,15 @@ class FileReplacement:
     def discard(self) -> None: ...
 
 def make_hidden_folder(path: _Path) -> PathLike[str]:
-    """Makes a hidden folder beside the file that `path` means, and removes there what
-    remove_leftovers does; its own goes so, should this process end before it is removed."""
+    """Makes a hidden folder beside the file `path`, and removes leftovers there like
+    remove_leftovers. If this process ends before it removes the folder, a later call does."""
 
 def put_in_place(file: _Path, path: _Path) -> None:
-    """Brings a whole file to the disk and puts it in the place of the one that `path` means, with
-    an old one's rights; both must be of one file system."""
+    """Flushes a whole file to the disk and puts it in the place of the file `path`, with the
+    permissions of the old file; both must be on one file system."""
 
 def remove_leftovers(folder: _Path) -> None:
-    """Removes what processes of this machine that have ended left of files that they wrote."""
+    """Removes partial files of ended processes of this machine."""
 
 def parse_bytes(data: bytes, options: ParseOptions, /) -> Dna: ...
 def parse_file(path: _Path, options: ParseOptions, /) -> Dna: ...
@@ -886,7 +887,7 @@ class Pose:
     def controls(self) -> _F32: ...
 
 class Instance:
-    """One face through time, with the reference's one-frame latencies."""
+    """The state of one face through time, with the reference's one-frame latencies."""
 
     @property
     def lod(self) -> int: ...
@@ -894,11 +895,12 @@ class Instance:
     def lod(self, value: _Int) -> None: ...
     @property
     def masks(self) -> _F32:
-        """float32, one per region of each mesh; at 0 the region's networks rest. A copy."""
+        """float32, one per region of each mesh; 0 disables the region's networks. A copy."""
     @masks.setter
     def masks(self, value: npt.ArrayLike) -> None: ...
     def evaluate(self, raw: npt.ArrayLike, check: bool = False) -> Pose:
-        """float32[R] -> Pose; check is a DnaError for what is not finite, and no frame then."""
+        """float32[R] -> Pose; with check, a value that is not finite raises DnaError and no frame
+        passes."""
 
 class Rig:
     """A compiled face: turns raw controls into a Pose. Immutable, shared freely."""
@@ -915,11 +917,12 @@ class Rig:
     def from_bytes(
         bytes: bytes | bytearray | memoryview, trusted: bool = False, simd: str | None = None
     ) -> Rig:
-        """A Rig from what to_bytes or block gave, of this version and byte order."""
+        """A Rig from the output of to_bytes or block, of this version and byte order."""
     def to_bytes(self) -> bytes:
         """The compiled face as bytes, a cache for from_bytes."""
     def save(self, path: _Path) -> None:
-        """Writes to_bytes() to a file; an old file is whole until the new one is."""
+        """Writes to_bytes() to a file atomically: an old file stays until the new one is
+        complete."""
     @staticmethod
     def load(
         path: _Path,
@@ -928,24 +931,24 @@ class Rig:
         *,
         mapped: bool = False,
     ) -> Rig:
-        """A Rig from a file of save, of this version and byte order.
+        """A Rig from a file written by save, of this version and byte order.
 
-        Its hash and every index are checked. trusted=None leaves out the indices where the file is
-        this user's and nobody else may write it (never so on Windows): what was downloaded or
-        unpacked is so as well, therefore None is for folders that only this program fills. The hash
-        finds damage, not forgery. trusted=True leaves out both: one flipped bit may then end the
-        process. mapped uses the pages of a trusted file in place: they may only be replaced as a
-        whole file and not be written to or cut while the Rig lives. Raises DnaError.
+        The hash and every index are checked. trusted=None skips the indices if the file belongs to
+        this user and nobody else may write it (never on Windows). Downloaded or unpacked files
+        satisfy this too, so use None only for folders that only this program fills. The hash finds
+        damage, not forgery. trusted=True skips both checks: one flipped bit may then end the
+        process. mapped uses the pages of a trusted file in place: while the Rig lives, replace the
+        file only as a whole, never write to it or cut it. Raises DnaError.
         """
     def block(self) -> memoryview:
-        """The same without a copy."""
+        """The same as to_bytes, without a copy."""
     @property
     def rotation(self) -> str: ...
     @property
     def initial_raw_controls(self) -> _F32:
         """float32[R]: 0, but 1 for the w of each rotation that solvers and setups read."""
     def raw_to_gui(self, raw: npt.ArrayLike) -> _F32:
-        """float32[R] -> float32[G], where the table can be reversed."""
+        """float32[R] -> float32[G], if the table can be inverted."""
     @property
     def raw_control_names(self) -> list[str]: ...
     @property
@@ -975,10 +978,10 @@ class Rig:
     def evaluate(
         self, raw: npt.ArrayLike, lod: _Int = 0, settle: bool = True, check: bool = False
     ) -> Pose:
-        """float32[R] -> Pose; a function of raw alone when settle is true. Values outside [0, 1]
-        are taken as they are: joints and shapes go on, correctives clamp their factors, maps rest
-        outside their intervals. NaN or infinity spoils what its control drives and nothing else,
-        and no later pose; with check it is a DnaError that names the control.
+        """float32[R] -> Pose; a function of raw alone if settle is true. Values outside [0, 1] are
+        used as they are: joints and shapes extrapolate, correctives clamp their factors, maps are 0
+        outside their intervals. NaN or infinity affects only the outputs of its control, and no
+        later pose; with check it raises DnaError with the name of the control.
         """
     def evaluate_batch(
         self,
@@ -988,21 +991,21 @@ class Rig:
         settle: bool = True,
         check: bool = False,
     ) -> Pose:
-        """float32[N, R] -> Pose whose fields have a leading N; threads 0 is all cores. check names
-        the first frame and control that is not finite.
+        """float32[N, R] -> Pose whose fields have a leading N; threads 0 uses all cores. With
+        check, the error names the first frame and control that is not finite.
         """
     def find_non_finite(self, raw: npt.ArrayLike) -> list[tuple[int, str, float]]:
-        """float32[R] or float32[N, R] -> (frame, name, value) of all that is NaN or infinite."""
+        """float32[R] or float32[N, R] -> (frame, name, value) of each NaN or infinity."""
     def solver_poses(
         self, index: _Int, controls: npt.ArrayLike
     ) -> tuple[npt.NDArray[np.float64], _F32]:
-        """Of an RBF solver and a Pose's controls: distances from its inputs, in radians where they
-        are angles, and weights of its poses, 0 below the threshold.
+        """For an RBF solver and the controls of a Pose: the distances of its poses from the input
+        (radians for angles), and the weights of its poses, 0 below the threshold.
         """
     def instance(self) -> Instance: ...
 
 class Morph:
-    """The blend shape targets of one mesh, compiled for summing."""
+    """The blend shape targets of one mesh, compiled for fast sums."""
 
     def __init__(
         self, dna: Dna, mesh_index: _Int, *, matrix: npt.ArrayLike | None = None
@@ -1022,7 +1025,7 @@ class Morph:
         """float32[B] -> float32[V, 3]: base + sum of weight * delta."""
 
 class BoneSpace:
-    """Poses of joints to what another program keeps on bones in axes and units of its own."""
+    """Converts joint poses to bone channels of another program, with its axes and units."""
 
     def __init__(
         self,
@@ -1039,9 +1042,9 @@ class BoneSpace:
         """float32[J, 9] of a Pose -> (location[n, 3], rotation[n, 4] w x y z, scale[n, 3])."""
 
 class JointChain:
-    """The bones of an armature: what they keep to how each moves the skin.
+    """The bones of an armature: from bone channels to matrices that move the skin.
 
-    Each bone passes on all of its motion to those below it, shear included.
+    Each bone passes its whole motion on to its children, shear included.
     """
 
     def __init__(self, parents: npt.ArrayLike, rest: npt.ArrayLike) -> None:
@@ -1054,7 +1057,7 @@ class JointChain:
         """[B, 3], [B, 4] w x y z, [B, 3] -> float32[B, 3, 4], pose times the inverse of rest."""
 
 class Skin:
-    """How much each bone holds of each vertex of a mesh."""
+    """The skin weights of a mesh by bone."""
 
     def __init__(
         self,
@@ -1064,7 +1067,7 @@ class Skin:
         weights: npt.ArrayLike,
         bone_count: _Int,
     ) -> None:
-        """offsets int[V + 1]; bones int[N]; weights float32[N], 0 or more, of any sum."""
+        """offsets int[V + 1]; bones int[N]; weights float32[N], 0 or more, with any sum."""
     @property
     def vertex_count(self) -> int: ...
     @property
@@ -1081,9 +1084,9 @@ class Skin:
         """points float32[V, 3], matrices float32[B, 3, 4] of a JointChain -> float32[V, 3]."""
 
 class DirectFace:
-    """A face whose meshes get finished vertices, from frame to frame.
+    """A face that writes finished vertices of its meshes, frame by frame.
 
-    A mesh of which nothing changed since it was written to the same memory is passed over.
+    A mesh is skipped if nothing changed since it was written to the same memory.
     """
 
     def __init__(
@@ -1100,10 +1103,10 @@ class DirectFace:
     @property
     def mesh_count(self) -> int: ...
     def keep(self, location: npt.ArrayLike, rotation: npt.ArrayLike, scale: npt.ArrayLike) -> None:
-        """What the bones of the chain keep that are not in rows: [B, 3], [B, 4], [B, 3]."""
+        """Channels of the chain's bones that are not in rows: [B, 3], [B, 4], [B, 3]."""
     def set_base(self, mesh: _Int, base: npt.ArrayLike) -> None: ...
     def forget(self) -> None:
-        """The next frame writes every mesh."""
+        """Makes the next frame write every mesh."""
 
 def evaluate_faces(
     faces: Sequence[DirectFace],
@@ -1115,9 +1118,9 @@ def evaluate_faces(
     anew: bool = False,
     threads: _Int = 0,
 ) -> list[tuple[Pose, tuple[int, ...]]]:
-    """A frame of different faces -> of each (Pose, the meshes that were written).
+    """Evaluates one frame of several faces -> per face (Pose, the meshes that were written).
 
-    targets: of each face {mesh: float32[V, 3], or (address, V) of such memory}.
+    targets: per face {mesh: float32[V, 3], or (address, V) of such memory}.
     """
 
 def deform_faces(
@@ -1130,7 +1133,7 @@ def deform_faces(
     anew: bool = False,
     threads: _Int = 0,
 ) -> list[tuple[int, ...]]:
-    """The same from poses: joints float32[J, 9], blend_shapes float32[C] of each."""
+    """The same from poses: joints float32[J, 9] and blend_shapes float32[C] per face."""
 
 class Skins:
     """See risorius.Surface."""
@@ -1138,24 +1141,24 @@ class Skins:
     def __init__(self, dna: Dna, rig: Rig, lod: _Int) -> None: ...
 
 class Probe:
-    """Some points of Skins: uint32[P, 2], mesh and vertex."""
+    """Selected points of Skins: uint32[P, 2], mesh and vertex."""
 
     def __init__(self, skins: Skins, points: npt.ArrayLike) -> None: ...
     def positions(self, raw: npt.ArrayLike) -> _F64:
         """float32[R] -> float64[P, 3]."""
     def linearise(self, raw: npt.ArrayLike, highest: npt.ArrayLike, free: npt.ArrayLike) -> None:
-        """Keeps what each control does to the points at a pose."""
+        """Keeps the derivative of the points by each control at a pose."""
     def jacobian(self) -> _F32:
-        """float32[P, 3, R], as linearise found it."""
+        """float32[P, 3, R], from the last linearise."""
     def normal_matrix(self) -> _F64:
-        """float64[R, R]: its J^T J."""
+        """float64[R, R]: J^T J of the last linearise."""
     def gradient(self, residual: npt.ArrayLike) -> _F64:
-        """float64[P, 3] -> float64[R]: its J^T residual."""
+        """float64[P, 3] -> float64[R]: J^T residual of the last linearise."""
 
 def least_change(
     a: npt.ArrayLike, b: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike, ridge: _Float
 ) -> _F64:
-    """The x in [low, high] with the least |a x - b|^2 + ridge |x|^2."""
+    """The x in [low, high] that minimises |a x - b|^2 + ridge |x|^2."""
 
 def descend(
     h: npt.ArrayLike,
@@ -1167,16 +1170,17 @@ def descend(
     start: npt.ArrayLike,
     tolerance: _Float = 1e-5,
 ) -> _F64:
-    """The x in [low, high] with the least 1/2 x^T h x - g^T x + sparse |x - rest|."""
+    """The x in [low, high] that minimises 1/2 x^T h x - g^T x + sparse |x - rest|."""
 
 def rig_block_version() -> int:
-    """Of Rig.to_bytes; others are refused."""
+    """Version of Rig.to_bytes; from_bytes refuses other versions."""
 
 def compile_version() -> int:
-    """Of what Rig makes of a DNA; counted up where the poses of an old file change."""
+    """Version of the compilation from DNA to Rig; it increases if poses of existing files
+    change."""
 
 def quaternion_column_orders(dna: Dna) -> list[npt.NDArray[np.uint32]]:
-    """Of each joint group the columns that turn quaternion joints, uint32[n], in the order in
+    """The columns of each joint group that rotate quaternion joints, uint32[n], in the order in
     which their rotations are multiplied.
 
     Raises:
@@ -1184,10 +1188,10 @@ def quaternion_column_orders(dna: Dna) -> list[npt.NDArray[np.uint32]]:
     """
 
 def available_simd() -> str:
-    """The instruction sets that this processor has, as `simd=` takes them, apart by blanks."""
+    """The instruction sets of this processor, in the words of `simd=`, separated by blanks."""
 
 class GroupSizes:
-    """Joint groups, their rows, coefficients stored (zeros too), not zero."""
+    """Number of joint groups, rows, stored coefficients (with zeros), and nonzero coefficients."""
 
     @property
     def groups(self) -> int: ...
@@ -1211,7 +1215,7 @@ class LargestChange:
     def lod(self) -> int: ...
 
 class RegroupReport:
-    """What regroup did."""
+    """The result of regroup."""
 
     @property
     def before(self) -> GroupSizes: ...
@@ -1227,22 +1231,22 @@ class RegroupReport:
     def microseconds_after(self) -> float: ...
     @property
     def translation_mm(self) -> LargestChange:
-        """Of a joint against its parent."""
+        """Translation of a joint relative to its parent."""
     @property
     def rotation_degrees(self) -> LargestChange:
-        """Of a joint against its parent."""
+        """Rotation of a joint relative to its parent."""
     @property
     def scale(self) -> LargestChange:
-        """Of a joint, 1 is its size."""
+        """Scale of a joint; 1 is the original size."""
     @property
     def position_mm(self) -> LargestChange:
-        """Of a joint in the face."""
+        """Position of a joint in the face."""
     @property
     def expressions(self) -> int:
-        """Raw controls that were tried one by one."""
+        """Number of raw controls tried one by one."""
     @property
     def combinations(self) -> int:
-        """Random poses that were tried."""
+        """Number of random poses tried."""
 
 class JointFit:
     """Joints, weights and joint motions that repeat shapes."""
@@ -1336,36 +1340,36 @@ def fit_motions(
     """JointFit with these weights: see risorius.author.fitting."""
 
 class FaultSums:
-    """What is worse than allowed, in one number of each kind."""
+    """The faults beyond the allowed ones, as one number of each kind."""
 
     @property
     def volume(self) -> float:
-        """mm3: depth times area."""
+        """mm3: sum of depth times area."""
     @property
     def deepest(self) -> float:
-        """mm beyond what is allowed."""
+        """mm beyond the allowed depth."""
     @property
     def stretched(self) -> int:
-        """Faces of more than 2.5 times their area."""
+        """Number of faces with more than 2.5 times their neutral area."""
     @property
     def widest(self) -> float:
-        """Times its area, of the most stretched of these."""
+        """Area of the most stretched face, relative to its neutral area."""
     @property
     def folded(self) -> int:
-        """Edges whose faces lie on one another."""
+        """Number of edges whose faces lie on one another."""
 
 class SkinFaults:
-    """What may be wrong with a pose of a skin."""
+    """The faults of a posed skin."""
 
     def __init__(
         self, depth: npt.ArrayLike, stretch: npt.ArrayLike, fold: npt.ArrayLike
     ) -> None: ...
     @property
     def depth(self) -> _F32:
-        """float32[V], mm inside of a solid, or of the skin itself."""
+        """float32[V], depth in mm inside a solid or the skin itself."""
     @property
     def stretch(self) -> _F32:
-        """float32[F], area beside the neutral one."""
+        """float32[F], area relative to the neutral area."""
     @property
     def fold(self) -> _F32:
         """float32[inner edges], cosine between the normals of both faces."""
@@ -1383,7 +1387,7 @@ class SkinChecker:
     ) -> None: ...
     @property
     def shown(self) -> npt.NDArray[np.bool_]:
-        """bool[V]: what somebody may see; nothing else is asked to stay outside."""
+        """bool[V]: visible vertices; only these must stay outside."""
     def nearest(self, points: npt.ArrayLike, normals: npt.ArrayLike) -> tuple[_U32, _F64, _F64]:
         """uint32[n, 3] corners of the nearest triangle of the neutral skin, float64[n, 3] shares of
         them, float64[n] mm."""
@@ -1435,6 +1439,35 @@ class SparseCholesky:
     def solve(self, right: npt.ArrayLike, threads: _Int = 0) -> _F64:
         """float64[n, sides]."""
 
+class RegisterOptions:
+    """See risorius.anyhead.registration."""
+
+    def __init__(
+        self,
+        *,
+        mm: _Float,
+        trusted: list[int],
+        mirrored: list[int],
+        symmetry: _Float,
+        nodes: _Int,
+        noise: _Float,
+        threads: _Int,
+    ) -> None: ...
+
+def register_surface(
+    points: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    target_points: npt.ArrayLike,
+    target_triangles: npt.ArrayLike,
+    pair_vertices: npt.ArrayLike,
+    pair_points: npt.ArrayLike,
+    pair_weights: npt.ArrayLike,
+    start: npt.ArrayLike | None,
+    options: RegisterOptions,
+    progress: Callable[[float], bool | None] | None,
+) -> tuple[_F64, _I32, _F64, _F64, npt.NDArray[np.bool_]]:
+    """points, triangle, shares, distance, trusted: see risorius.anyhead.registration."""
+
 def simplify(
     positions: npt.ArrayLike,
     attributes: npt.ArrayLike,
@@ -1467,12 +1500,12 @@ def regroup(
     """(Dna, RegroupReport): see risorius.rigs.edit.regroup."""
 
 def keep_parts(dna: Dna, *, joints: Sequence[bool], correctives: Sequence[bool]) -> Dna:
-    """A copy with the joints and correctives alone that are True; every index counts in what is
-    left.
+    """A copy with only the joints and correctives that are True; all indices refer to the remaining
+    items.
     """
 
 class LayerCurves:
-    """The curves of a layer, made ready for a list of controls."""
+    """The curves of a layer, prepared for a list of controls."""
 
     def __init__(
         self,
@@ -1491,7 +1524,7 @@ class LayerCurves:
         """Seconds of the first and of the last frame."""
 
 class MixerCore:
-    """What risorius.Mixer evaluates with."""
+    """The evaluator of risorius.Mixer."""
 
     def __init__(
         self,
@@ -1502,11 +1535,11 @@ class MixerCore:
     ) -> None: ...
     def set_layers(self, layers: Sequence[dict[str, Any]]) -> None: ...
     def set_reactions(self, reactions: Sequence[Sequence[tuple[Any, ...]]]) -> None:
-        """Each a list of parts: controls, weights, delay, attack, hold, release."""
+        """A list of parts each: controls, weights, delay, attack, hold, release."""
     def set_rules(
         self, yields: Sequence[tuple[Any, ...]], opposites: Sequence[tuple[int, int]]
     ) -> None:
-        """Yields are by, of, measure, amount."""
+        """Each yields has by, of, measure, amount."""
     def fire(self, reaction: _Int, time: _Float, strength: _Float) -> bool: ...
     def clear_fired(self) -> None: ...
     def evaluate(

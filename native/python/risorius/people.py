@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The package that makes sample people: a wheel of its own, found by its entry points."""
+"""The package of the sample people: a wheel of its own, found by its entry points."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ GROUP = "risorius.people"
 
 
 class NoPeopleError(RisoriusError):
-    """The wheel of the sample people is not installed, or of another version."""
+    """The wheel of the sample people is not installed, or has another version."""
 
     code = "no_people"
 
@@ -22,10 +22,11 @@ def people(name: str = "package") -> ModuleType:
     """A module of the wheel `risorius-people`.
 
     Args:
-        name: of the entry point: `package` makes people, `command` is `risorius sample`.
+        name: name of the entry point: `package` makes people, `command` is `risorius sample`.
 
     Raises:
-        NoPeopleError: the wheel is not installed, or its version is not this package's.
+        NoPeopleError: the wheel is not installed, or its version is not the version of this
+            package.
     """
     for entry in metadata.entry_points(group=GROUP, name=name):
         found = entry.dist.version if entry.dist else __version__

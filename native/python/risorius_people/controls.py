@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""GUI controls of the sample: the board's names and ranges, each leading to raw controls."""
+"""GUI controls of the sample: names and ranges of the board, mapped to raw controls."""
 
 # GUI control, raw control for its positive half, raw control for its negative half or "".
 # {s} stands for the side.
@@ -81,7 +81,7 @@ MIDDLE = [
     ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
     ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
-# Of the upper and the lower lip, {v} is U or D; and of the teeth.
+# Controls of the upper and the lower lip ({v} is U or D) and of the teeth.
 LIPS = [
     ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
     ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),
@@ -99,15 +99,16 @@ LIPS_MIDDLE = [
     ("CTRL_C_teeth{v}.tx", "teethLeft{v}", "teethRight{v}"),
     ("CTRL_C_teeth_fwdBack{v}.ty", "teethFwd{v}", "teethBack{v}"),
 ]
-# GUI control, raw controls one after the other as it goes from 0 to 1: these stay, those pass.
+# GUI control and the raw controls that follow one another from 0 to 1: STICKY ones stay on,
+# SWALLOW ones go off again.
 STICKY = ("CTRL_{s}_mouth_lipSticky.ty", [f"mouthLipsSticky{{s}}Ph{n}" for n in (1, 2, 3)])
 SWALLOW = ("CTRL_C_neck_swallow.ty", [f"neckSwallowPh{n}" for n in (1, 2, 3, 4)])
-# Of a conditional: from, to, slope, cut.
+# A conditional: from, to, slope, cut.
 Range = tuple[float, float, float, float]
 
 
 def gui_table() -> list[tuple[str, list[tuple[str, Range]]]]:
-    """GUI controls, each with the raw controls that it leads to and in which range."""
+    """GUI controls, each with its raw controls and their input ranges."""
     rows = []
     for side in "LR":
         for gui, up, down in SIDED:
@@ -133,7 +134,7 @@ def _two_sided(up: str, down: str) -> list[tuple[str, Range]]:
 
 
 def _filling(names: list[str]) -> list[tuple[str, Range]]:
-    """One after the other goes from 0 to 1 and stays."""
+    """Conditionals that raise one raw control after the other from 0 to 1; each stays on."""
     count = len(names)
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):
@@ -144,7 +145,7 @@ def _filling(names: list[str]) -> list[tuple[str, Range]]:
 
 
 def _passing(names: list[str]) -> list[tuple[str, Range]]:
-    """One after the other comes and goes; each begins where the one before is whole."""
+    """Conditionals that turn raw controls on and off in turn: each starts where the last peaks."""
     count = len(names) + 1
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):

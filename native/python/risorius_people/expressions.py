@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What each control of the sample does: displacements of all vertices, and joint motions."""
+"""The expression of each raw control: displacements of all vertices, and joint motions."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ _BROWS = [f"eyebrows-{side}-{way}" for side in ("left", "right") for way in ("do
 
 @dataclass
 class Expression:
-    """One raw control at 1: where every vertex goes, and how much of it the joints do."""
+    """The motion of one raw control at 1, and the part of it that the joints do."""
 
-    displacement: Floats  # [V, 3] in decimetres: the whole motion
+    displacement: Floats  # [V, 3], decimetres: the whole motion, joints included
     joints: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)  # rotation, translation
 
 
 def side_masks(positions: Floats) -> dict[str, Floats]:
-    """Left and right halves that sum to 1; the character's left is +x."""
+    """Weights of the left and right half, with sum 1; the character's left is +x."""
     left = smooth_step(positions[:, 0] / 0.5 + 0.5)
     return {"L": left, "R": 1 - left}
 
 
 def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
-    """Upper and lower that sum to 1: what the opening jaw takes along is lower.
+    """Weights of the upper and lower lip, with sum 1; vertices that jawOpen moves are lower.
 
-    Space cannot tell the lips apart, they touch; the motion of the jaw can.
+    The lips touch, so positions cannot separate them; the jaw's motion can.
     """
     travel = np.linalg.norm(jaw_open, axis=1)
     lower = smooth_step(travel / (0.55 * np.quantile(travel[travel > 0], 0.95)))
@@ -48,11 +48,11 @@ def lip_masks(jaw_open: Floats) -> dict[str, Floats]:
 
 
 def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
-    """The 52 ARKit units, divided over the raw controls of their row in arkit.toml.
+    """The 52 ARKit units, divided over the raw controls of their rows in arkit.toml.
 
     Args:
-        source: the data that the units come from.
-        positions: float64[V, 3], decimetres; they tell left from right.
+        source: the data with the units.
+        positions: float64[V, 3], decimetres; they separate left from right.
     """
     count = len(positions)
     sides = side_masks(positions)
@@ -75,12 +75,12 @@ def split_units(source: Source, positions: Floats) -> dict[str, Expression]:
 def extra_units(
     source: Source, positions: Floats, origin: Mapping[str, float]
 ) -> dict[str, Expression]:
-    """Controls beyond ARKit that the FACS-like targets of the data can show.
+    """Expressions beyond ARKit, from the FACS-like targets of the data.
 
     Args:
-        source: the data that they come from.
-        positions: float64[V, 3], decimetres; they tell left from right.
-        origin: shares of the data's origins, together 1.
+        source: the data with the targets.
+        positions: float64[V, 3], decimetres; they separate left from right.
+        origin: share of each origin of the data, with sum 1.
     """
     sides = side_masks(positions)
 
@@ -113,18 +113,18 @@ def add_further_units(
     positions: Floats,
     origin: Mapping[str, float],
 ) -> dict[tuple[str, str], Floats]:
-    """Give a face what its data do not show as units: all that further.toml has.
+    """Add the expressions of further.toml, which the data do not have as units.
 
     Args:
-        out: the expressions by name; the further ones are added.
+        out: expressions by name; the further ones are added.
         source: the data.
         base: the base mesh.
         groups: vertex indices by group of the base mesh.
         positions: float64[V, 3], decimetres.
-        origin: shares of the data's origins, together 1.
+        origin: share of each origin of the data, with sum 1.
 
     Returns:
-        float64[V, 3] of its correctives by their two raw controls.
+        Their correctives: float64[V, 3] by two raw controls.
     """
     count = len(positions)
     brows = sum(np.abs(unit_shape(source, origin, name, count)) for name in _BROWS)
@@ -143,10 +143,10 @@ def add_joint_motion(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Give jaw, teeth and eyes their joints: the rigid motion that fits teeth and eyeballs best.
+    """Give jaw, teeth and eyes joint motions: the rigid motions that fit teeth and eyeballs best.
 
     Args:
-        out: the expressions by name; gets jawBack and jawOpenExtreme too.
+        out: expressions by name; jawBack and jawOpenExtreme are added.
         groups: vertex indices by group of the base mesh.
         positions: float64[V, 3], decimetres.
         pivots: joint positions by name.
@@ -180,13 +180,13 @@ def add_joint_motion(
 
 
 def cheek_mass(units: dict[str, Expression], places: Floats, side: str) -> Floats:
-    """float64[V, 3]: the fat of a cheek that a true smile pushes up, and over the line of the lip.
+    """The fat of a cheek that a true smile pushes up, over the laugh line, float64[V, 3].
 
-    It ends at that line, where the skin turns in: the fold is part of the shape. Teeth stay.
+    The displacement ends at the laugh line, where the skin folds in. Teeth do not move.
 
     Args:
-        units: what each raw control does, by its name.
-        places: float64[V, 3] on the man's head, measured from between his eyes, decimetres.
+        units: the expression of each raw control, by name.
+        places: float64[V, 3] on the man's head, from the point between his eyes, decimetres.
         side: L or R.
     """
     away, there = from_laugh_line(places)
@@ -211,10 +211,10 @@ def leave_bones(
     positions: Floats,
     pivots: dict[str, Floats],
 ) -> None:
-    """Teeth and eyeballs go with their joints alone: what is hard keeps its form. Pupils do not.
+    """Move teeth and eyeballs by their joints alone, so that they stay rigid. Pupils may change.
 
     Args:
-        out: the expressions by name, with their joints; displacements are changed.
+        out: expressions by name, with their joints; displacements are changed.
         groups: vertex indices by group of the base mesh.
         positions: float64[V, 3], decimetres.
         pivots: joint positions by name.
@@ -240,13 +240,13 @@ def leave_bones(
 
 
 def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
-    """What brings lips together under an open jaw, by jawOpen and the control of each quarter.
+    """Take the displacements that close the lips of an open jaw, by jawOpen and quarter control.
 
-    The data's shape takes back what the jaw opens: over a shut jaw it would lift the lower lip far
-    over the upper one. So the controls do nothing by themselves.
+    The data's shape undoes the opening of the jaw. On a shut jaw it would lift the lower lip far
+    over the upper one, so the controls alone do nothing and the displacement becomes a corrective.
 
     Args:
-        out: the expressions by name; those of the lips' quarters become still.
+        out: expressions by name; the quarters' displacements become 0.
     """
     result: dict[tuple[str, str], Floats] = {}
     for name in LIPS_TOGETHER:
@@ -258,19 +258,19 @@ def take_closing(out: dict[str, Expression]) -> dict[tuple[str, str], Floats]:
 def corrective_displacements(
     out: dict[str, Expression], places: Floats
 ) -> dict[tuple[str, str], Floats]:
-    """What to add where two controls meet; (a, b) fires with the product of both.
+    """Displacements to add where two controls are active; (a, b) has the weight a * b.
 
     Args:
-        out: what each raw control does, by its name.
-        places: float64[V, 3] of the man's vertices, measured from between his eyes, decimetres.
+        out: the expression of each raw control, by name.
+        places: float64[V, 3] of the man's vertices, from the point between his eyes, decimetres.
     """
     lower = lip_masks(out["jawOpen"].displacement)["D"][:, None]
     result: dict[tuple[str, str], Floats] = {}
     for side in ("L", "R"):
-        # The open jaw stretches the lower lip: a smile cannot lift it as far.
+        # The open jaw stretches the lower lip, so a smile lifts it less.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
-        # The lower lid comes half way: the upper lid has that much less to close.
+        # The raised lower lid leaves the upper lid a shorter way to close.
         blink = out[f"eyeBlink{side}"].displacement
         raised = out[f"eyeCheekRaise{side}"].displacement
         travel = np.linalg.norm(blink, axis=1)
@@ -282,6 +282,6 @@ def corrective_displacements(
         ball = cheek_mass(out, places, side)
         result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
         for lips in ("mouthFunnel", "mouthLipsPurse"):
-            # Lips that are pushed forward keep touching the teeth line less when the jaw drops.
+            # Lips pushed forward touch the teeth line less as the jaw drops.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
     return result

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The line along which a smile folds the cheek over the lip. Lengths are decimetres."""
+"""The laugh line, along which a smile folds the cheek over the lip. Lengths are decimetres."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _ASIDE = (0.165, 0.215, 0.27, 0.325, 0.345)  # from the middle of the face
 
 
 def from_laugh_line(places: Floats) -> tuple[Floats, Floats]:
-    """How far places lie from the line that runs from the wing of the nose past the mouth.
+    """Distance from the laugh line, which runs from the wing of the nose past the mouth.
 
     Args:
-        places: float64[..., 3] on the man's head, measured from between his eyes.
+        places: float64[..., 3] on the man's head, from the point between his eyes.
 
     Returns:
-        float64[...] distances, positive on the cheek; and float64[...], 1 beside the line and 0
-        beyond its ends.
+        Distances float64[...], positive on the cheek; and weights float64[...], 1 beside the line
+        and 0 beyond its ends.
     """
     x, y = np.abs(places[..., 0]), places[..., 1]
     away = 0.86 * (x - np.interp(-y, _DOWN, _ASIDE))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One mesh of the sample at one LOD, and how values reach it from the base mesh."""
+"""A mesh of the sample at one LOD, and the operators that carry values to it from the base mesh."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Part:
 
     name: str
     polygons: Polygons
-    operators: list[Operator]  # from the base mesh's vertices to this mesh's, in order
-    rests: bool = False  # whether no expression moves it but by its joints
+    operators: list[Operator]  # from vertices of the base mesh to vertices of this mesh, in order
+    rests: bool = False  # whether expressions move it by joints alone
 
     def carry(self, values: Floats) -> Floats:
         for operator in self.operators:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Who can be built: age, build, origin and features as shares of the data's shapes; colours."""
+"""The people that can be built: age, build, origin and features as weights of shapes; colours."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 @dataclass(frozen=True)
 class Person:
-    """A sample person. Colours are sRGB in [0, 1]; the keys are said in cast.toml."""
+    """A sample person. Colours are sRGB in [0, 1]; cast.toml explains the keys."""
 
     name: str
     gender: str
@@ -51,7 +51,7 @@ class Person:
     brows: Colour
     beard: float
     iris: tuple[Colour, Colour]
-    """At the pupil, at the rim."""
+    """Colours at the pupil and at the rim."""
     shirt: Colour = (0.22, 0.24, 0.28)
     muscle: float = 0.5
     weight: float = 0.5
@@ -59,7 +59,7 @@ class Person:
     scalp: float = 0.9
     features: dict[str, float] = field(default_factory=dict)
     asymmetry: dict[str, float] = field(default_factory=dict)
-    """Shapes of the data that make one side unlike the other -> -1 (the right) to 1 (the left)."""
+    """Shapes that make the two sides differ -> weight, -1 (right) to 1 (left)."""
     hair_style: str = "crop"
     hair_length: float = 1.0
     hair_curl: float = 0.0
@@ -68,7 +68,7 @@ class Person:
     beard_style: str = "none"
 
     def shape(self) -> dict[str, float]:
-        """Body shapes of the data -> weights. Features are not in it, see Source.feature."""
+        """Body shapes of the data -> weights, without features (see Source.feature)."""
         ages: dict[str, float] = {}
         for (low, young), (high, old) in itertools.pairwise(_AGES):
             if low <= self.age <= high:
@@ -96,7 +96,7 @@ def _levels(what: str, value: float) -> list[tuple[str, float]]:
 
 
 class _Reader:
-    """Takes the keys of one person and says where one is not as it should be."""
+    """Reads the keys of one person and reports the first wrong one."""
 
     def __init__(self, where: str, table: dict[str, Any]) -> None:
         self.where, self.table = where, dict(table)
@@ -167,7 +167,7 @@ class _Reader:
 
 
 def _person(where: str, table: dict[str, Any], like: Person | None) -> Person:
-    """A person of a table. Raises ValueError with the key that is wrong."""
+    """A person from a table. Raises ValueError with the key that is wrong."""
     read = _Reader(where, table)
     values: dict[str, Any] = dict(vars(like)) if like else {}
     values |= read.take("name", read.text) | read.take("gender", read.gender)
@@ -202,14 +202,14 @@ MAN = PEOPLE["man"]
 
 
 def read_person(path: Path) -> Person:
-    """A person of a file of one's own.
+    """Read a person from a user's file.
 
     Args:
-        path: TOML, with the keys that cast.toml says.
+        path: TOML; cast.toml explains the keys.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: no TOML, or a key that is not as it should be.
+        OSError: the file cannot be read.
+        ValueError: no TOML, or a wrong key.
     """
     table = toml.read(path)
     like = table.pop("like", None)

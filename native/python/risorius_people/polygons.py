@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Polygon meshes as linear operators: what is done to positions is done to displacements."""
+"""Polygon meshes as linear operators: one operator moves positions and displacements alike."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Operator:
     def apply(self, values: Floats) -> Floats:
         flat = values.reshape(len(values), -1)
         out = np.zeros((self.shape[0], flat.shape[1]))
-        # Most expressions leave most meshes where they are.
+        # Most expressions do not move most meshes.
         moves = flat[self._used].any()
         for k in range(flat.shape[1] if moves else 0):
             terms = self.weights * flat[self.columns, k]
@@ -42,7 +42,7 @@ class Polygons:
 
 
 def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
-    """Undirected edges -> the faces that have them."""
+    """Undirected edges -> their faces."""
     edges: dict[tuple[int, int], list[int]] = {}
     for f, face in enumerate(faces):
         for a, b in zip(face, [*face[1:], face[0]], strict=True):
@@ -55,15 +55,15 @@ def edges_of(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
 
 
 def clip_below(mesh: Polygons, heights: Floats, level: float) -> tuple[Polygons, Operator]:
-    """Cut a mesh by a plane: what lies under level goes, cut edges get a new vertex.
+    """Cut a mesh by a plane: remove the part below the level; cut edges get a new vertex.
 
     Args:
-        mesh: is left as it is.
-        heights: float64[V], of its vertices over the plane of height 0.
+        mesh: is not changed.
+        heights: float64[V], height of each vertex over the plane.
         level: height of the cut.
 
     Returns:
-        The rest, its vertices compacted, and the operator from old vertices to new ones.
+        The rest with its vertices compacted, and the operator from old vertices to new vertices.
     """
     rows: list[tuple[int, int, float]] = []
     number: dict[object, int] = {}

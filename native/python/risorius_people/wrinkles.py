@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Where skin folds: masks of expressions from how far they compress it, and the folds' relief.
+"""Wrinkles from compression: masks of expressions, and the relief of the folds.
 
-A fold lies across the way that skin is pushed together, so its lines follow from the expression:
-the smallest stretch of each polygon says how deep, its direction where to (line integral
+A fold runs across the direction of compression, so its lines follow from the expression. The
+smallest stretch of each polygon gives the depth, its direction gives the lines (line integral
 convolution of noise: Cabral and Leedom, "Imaging Vector Fields Using Line Integral Convolution",
-1993). Names are those of MetaHuman's maps and masks, so that programs which know these show them.
+1993). The names are MetaHuman's names of maps and masks, so that programs that know them show the
+wrinkles.
 """
 
 from __future__ import annotations
@@ -20,23 +21,23 @@ from .folds import from_laugh_line
 from .part import Part
 from .polygons import Floats, Ints, Polygons
 
-_LEAST = 0.015  # of its length that skin loses before it folds
-_FULL = 0.15  # and where folds are as deep as they get
-_ROUNDS = 3  # of neighbours over which folds are evened out: skin is stiffer than a mesh
+_LEAST = 0.015  # share of its length that skin loses before it folds
+_FULL = 0.15  # share at which folds have their full depth
+_ROUNDS = 3  # smoothing rounds over neighbours: skin is stiffer than a mesh
 DEPTH = 0.007  # decimetres
 _FOLD_DEPTH = 0.015  # decimetres
-_LINES = 24  # texels to either side along which noise is drawn into a line
-_FINE, _COARSE = 1.5, 3.5  # texels: the widths between which folds lie
-_TILE = 512  # texels after which the noise begins again
+_LINES = 24  # texels to each side along which noise is averaged into a line
+_FINE, _COARSE = 1.5, 3.5  # texels: smallest and largest width of a fold
+_TILE = 512  # texels after which the noise repeats
 _SEED = 23
 
 
 @dataclass(frozen=True)
 class Region:
-    """A mask: which set of textures it shows, and what drives it."""
+    """A mask: the texture set that it shows, and its drivers."""
 
-    number: int  # of the set, 1 to 3
-    drivers: Mapping[str, float]  # raw control without its side -> how much of the mask at 1
+    number: int  # number of the set, 1 to 3
+    drivers: Mapping[str, float]  # raw control without its side -> weight of the mask at 1
 
 
 REGIONS = {
@@ -56,7 +57,7 @@ SETS = (1, 2, 3)
 
 
 def map_names() -> list[str]:
-    """Animated maps, in the order of REGIONS, left before right."""
+    """Names of the animated maps, in the order of REGIONS, left before right."""
     return [
         f"head_wm{region.number}_normal_{mask_name(name, side)}"
         for name, region in REGIONS.items()
@@ -65,10 +66,10 @@ def map_names() -> list[str]:
 
 
 def mask_name(region: str, side: str) -> str:
-    """The name of a mask, which its file has too: head_wm1_blink_L.
+    """The name of a mask and of its file: head_wm1_blink_L.
 
     Args:
-        region: one of REGIONS.
+        region: a key of REGIONS.
         side: L or R.
     """
     return f"head_wm{REGIONS[region].number}_{region}_{side}"
@@ -78,16 +79,16 @@ SMILE, FROWN = mask_name("smile", "L"), mask_name("browsDown", "L")
 
 
 def masks_of(number: int) -> list[str]:
-    """The masks that show a set.
+    """The masks of a set.
 
     Args:
-        number: of the set.
+        number: number of the set.
     """
     return [mask_name(n, side) for n, r in REGIONS.items() if r.number == number for side in "LR"]
 
 
 def drivers() -> list[tuple[str, int, float]]:
-    """(raw control, map, slope) of each that drives a map."""
+    """(raw control, map, slope) of each driver."""
     out = []
     number = 0
     for region in REGIONS.values():
@@ -98,7 +99,7 @@ def drivers() -> list[tuple[str, int, float]]:
 
 
 class Surface:
-    """The head's polygons as triangles, at rest, with their texture coordinates."""
+    """The head's polygons as triangles in the neutral pose, with their texture coordinates."""
 
     def __init__(self, polygons: Polygons, uvs: Floats, positions: Floats) -> None:
         corners, places = [], []
@@ -114,21 +115,21 @@ class Surface:
         size = np.linalg.det(edges)
         flat = np.abs(size) < 1e-12
         edges[flat] = np.eye(2)
-        # From the triangle's own plane to the texture's.
+        # Maps from the triangle's plane to the texture.
         self.back = np.linalg.inv(self.rest)
         self.to_uv = edges @ self.back
 
     def folds(self, moved: Floats) -> Floats:
-        """float64[V, 4]: how far skin is pushed together at each vertex (0 to 1), and the lines of
-        the folds in the texture as a tensor xx, xy, yy.
+        """Compression at each vertex (0 to 1), and the direction of the folds in the texture as a
+        tensor xx, xy, yy, float64[V, 4].
 
         Args:
-            moved: float64[V, 3], where the vertices are with the expression.
+            moved: float64[V, 3], vertices in the expression.
         """
         change = _frames(moved[self.corners]) @ self.back
         _, stretch, right = np.linalg.svd(change)
         depth = np.clip((1 - stretch[:, 1] - _LEAST) / (_FULL - _LEAST), 0, 1)
-        along = right[:, 0]  # the other axis than the one that is pushed together
+        along = right[:, 0]  # the axis across the compression
         lines = np.einsum("tij,tj->ti", self.to_uv, along)
         lines /= np.maximum(np.linalg.norm(lines, axis=1, keepdims=True), 1e-12)
         x, y = lines.T
@@ -136,11 +137,12 @@ class Surface:
         return self.evened(self._at_vertices(rows), _ROUNDS)
 
     def evened(self, values: Floats, rounds: int) -> Floats:
-        """Each vertex half itself, half the mean of its triangles, so many times.
+        """Smooth values: each round takes half of each vertex and half of the mean of its
+        triangles.
 
         Args:
             values: float64[V, ...].
-            rounds: how often.
+            rounds: number of rounds.
         """
         for _ in range(rounds):
             middles = values[self.corners].mean(axis=1)
@@ -148,7 +150,7 @@ class Surface:
         return values
 
     def _at_vertices(self, rows: Floats) -> Floats:
-        """float64[V, ...]: the mean of what the triangles about each vertex have, [T, ...]."""
+        """The mean of the triangles' values [T, ...] about each vertex, float64[V, ...]."""
         sums = np.zeros((len(self._about), *rows.shape[1:]))
         for k in range(3):
             np.add.at(sums, self.corners[:, k], rows)
@@ -156,7 +158,7 @@ class Surface:
 
 
 def _frames(triangles: Floats) -> Floats:
-    """float64[n, 2, 2]: the two edges of each triangle in a plane of its own."""
+    """The two edges of each triangle in its own plane, float64[n, 2, 2]."""
     a, b = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     length = np.maximum(np.linalg.norm(a, axis=1), 1e-12)
     first = a / length[:, None]
@@ -171,13 +173,13 @@ def _frames(triangles: Floats) -> Floats:
 def vertex_folds(
     part: Part, uvs: Floats, positions: Floats, units: Mapping[str, Expression]
 ) -> dict[str, Floats]:
-    """float64[V, 4] of each mask by its name, see Surface.folds.
+    """Folds of each mask, float64[V, 4] by name, see Surface.folds.
 
     Args:
         part: the head.
         uvs: float64[T, 2] in [0, 1].
         positions: float64[v, 3] of its vertices, decimetres.
-        units: what each raw control does, by its name.
+        units: expression of each raw control, by name.
     """
     surface = Surface(part.polygons, uvs, positions)
     out = {}
@@ -192,18 +194,18 @@ def vertex_folds(
 def folds_of_sides(
     surface: Surface, positions: Floats, moves: Mapping[str, Floats]
 ) -> dict[str, Floats]:
-    """float64[V, 4] by side: the folds that both sides make together, shared out.
+    """Folds of both sides together, shared between the sides, float64[V, 4] by side.
 
-    One side alone pushes skin together where it fades out in the middle of the face, which both
-    together do not.
+    One side alone compresses the skin in the middle of the face, where its motion fades out. Both
+    sides together do not.
 
     Args:
         surface: the head.
         positions: float64[V, 3] of its vertices.
-        moves: float64[V, 3] by side, what the control of that side moves them.
+        moves: float64[V, 3] by side, displacement of that side's control.
     """
     both = surface.folds(positions + sum(moves.values()))
-    # Evened as far as folds are, or what stays where it is amid what moves had none.
+    # Smooth as widely as folds: otherwise still skin amid moving skin would get no folds.
     far = {
         side: surface.evened(np.linalg.norm(move, axis=1), _ROUNDS + 1)
         for side, move in moves.items()
@@ -213,7 +215,7 @@ def folds_of_sides(
 
 
 def blurred(image: Floats, width: float) -> Floats:
-    """An image [h, w, ...] evened out by a Gaussian, held at its rims.
+    """An image [h, w, ...] blurred by a Gaussian; its rims are repeated outward.
 
     Args:
         image: float64[h, w, ...].
@@ -234,11 +236,11 @@ def blurred(image: Floats, width: float) -> Floats:
 
 
 def relief(tensors: Floats, there: Floats) -> Floats:
-    """float64[h, w]: folds along the lines of a field of tensors, from -1 (deepest) to 0.
+    """Folds along the lines of a tensor field, float64[h, w], from -1 (deepest) to 0.
 
     Args:
         tensors: float64[h, w, 3], xx, xy, yy of the lines in the texture.
-        there: bool[h, w], where they are asked for.
+        there: bool[h, w], texels to compute.
     """
     size = len(tensors)
     noise = np.random.default_rng(_SEED).normal(size=(_TILE, _TILE))
@@ -272,11 +274,11 @@ def relief(tensors: Floats, there: Floats) -> Floats:
 
 
 def normals(heights: Floats, places: Floats) -> Floats:
-    """float64[h, w, 3] in [0, 1]: the normals of a relief in the texture's own axes.
+    """Normals of a relief in texture space, float64[h, w, 3] in [0, 1].
 
     Args:
         heights: float64[h, w], decimetres.
-        places: float64[h, w, 3], where each texel is on the head, decimetres.
+        places: float64[h, w, 3], place of each texel on the head, decimetres.
     """
     slopes = []
     for axis in (1, 0):
@@ -290,16 +292,16 @@ def normals(heights: Floats, places: Floats) -> Floats:
 
 
 def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
-    """The fold from the wing of the nose past the corner of the mouth, as a smile makes it.
+    """The smile's fold from the wing of the nose past the corner of the mouth.
 
-    Compression alone gives fine lines there: the cheek's fat slides over the lip as one mass.
+    Compression alone gives fine lines there, but the cheek's fat slides over the lip as one mass.
 
     Args:
-        places: float64[h, w, 3], where each texel is on the head, decimetres.
+        places: float64[h, w, 3], place of each texel on the head, decimetres.
         eye: float64[3], the left eye's middle.
 
     Returns:
-        float64[h, w] heights in decimetres, and float64[h, w] where they are, 0 to 1.
+        Heights in decimetres, float64[h, w], and a mask of the fold, float64[h, w], 0 to 1.
     """
     away, there = from_laugh_line(places - [0, eye[1], eye[2]])
     groove = -_FOLD_DEPTH * np.exp(-((away / 0.022) ** 2))
@@ -308,11 +310,11 @@ def laugh_fold(places: Floats, eye: Floats) -> tuple[Floats, Floats]:
 
 
 def fold_heights(folds: Floats, strength: Floats) -> Floats:
-    """float64[h, w]: the relief of all folds of a set, decimetres, 0 where there are none.
+    """The relief of all folds of a set, float64[h, w], decimetres, 0 without folds.
 
     Args:
         folds: float64[h, w, 4], sums of vertex_folds in the texture.
-        strength: float64[h, w], how deep folds are: 1 as on a forehead of 30 years.
+        strength: float64[h, w], depth factor: 1 is a forehead at 30 years.
     """
     depth = np.clip(folds[..., 0], 0, 1)
     height = relief(folds[..., 1:], depth > 0.01)

@@ -80,7 +80,7 @@ Status check(const FaceParts& parts) {
   return core::ok();
 }
 
-// Where the deltas of each block begin: [channels, blocks + 1].
+// The begin of each block in the deltas of each channel: [channels, blocks + 1].
 std::vector<std::uint32_t> block_starts(const Morph& morph, std::uint32_t blocks) {
   std::vector<std::uint32_t> starts;
   starts.reserve(morph.channels.size() * (std::size_t{blocks} + 1));
@@ -103,7 +103,7 @@ void copy_to(const std::vector<float>& from, float* to) {
   if (to != nullptr) std::copy(from.begin(), from.end(), to);
 }
 
-// rotation = turn * rotation, w x y z.
+// rotation = turn * rotation; both are w x y z.
 void add_turn(const float* turn, float* rotation) {
   const Quaternion q = multiply({turn[1], turn[2], turn[3], turn[0]},
                                 {rotation[1], rotation[2], rotation[3], rotation[0]});
@@ -131,7 +131,7 @@ DirectFace::DirectFace(FaceParts parts)
   affine_.resize(bones);
   matrices_.resize(bones * 12);
   last_matrices_.resize(bones * 12);
-  rows_.resize((bones + 1) * simd::kSkinRow);  // the last is of no bone
+  rows_.resize((bones + 1) * simd::kSkinRow);  // the last row is for influences without a bone
   weights_.resize(parts_.rig->blend_shape_count);
   bone_changed_.resize(bones);
   channel_changed_.resize(weights_.size());
@@ -198,7 +198,7 @@ void DirectFace::evaluate_joints(const float* joints, const float* turns) noexce
     std::copy_n(scale + i * 3, 3, scaled + b * 3);
   }
   if (has_matrices_ && same_bits(channels_.data(), last_channels_.data(), channels_.size())) return;
-  last_channels_ = channels_;  // of equal size: no allocation
+  last_channels_ = channels_;  // of equal size, so that nothing is allocated
   evaluate_chain(*parts_.chain, all, turned, scaled, affine_.data(), matrices_.data());
   for (std::size_t b = 0; b < bones; ++b) {
     if (has_matrices_ && same_bits(&matrices_[b * 12], &last_matrices_[b * 12], 12)) continue;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// DirectFace: from controls to the finished vertices of a face's meshes, many faces at once.
+// DirectFace: evaluates controls to the finished vertices of a face's meshes, for many faces at
+// once.
 #pragma once
 
 #include <cstdint>
@@ -17,36 +18,37 @@
 
 namespace risorius::rig {
 
-/// What a face is made of. The armature may have more bones than the rig moves: these keep what
-/// `keep` said last.
+/// The parts of a face. The armature may have more bones than the rig moves: the others keep the
+/// values of the last call of `keep`.
 struct FaceParts {
   struct Mesh {
     std::shared_ptr<const Morph> morph;
     std::shared_ptr<const Skin> skin;
-    std::vector<float> base;  // [vertices, 3]: no channel, no bone moves them
+    std::vector<float> base;  // [vertices, 3]: the vertices without channels and bones
   };
   std::shared_ptr<const Rig> rig;
   std::shared_ptr<const BoneSpace> space;
   std::shared_ptr<const JointChain> chain;
-  std::vector<std::uint32_t> rows;    // of each bone of space: which of the chain it is
-  std::vector<std::uint32_t> turned;  // which bones of space a frame's turns are added to
+  std::vector<std::uint32_t> rows;    // [bones of space]: its index in chain
+  std::vector<std::uint32_t> turned;  // bones of space to which a frame's turns are added
   std::vector<Mesh> meshes;
 };
 
-/// Where the vertices of a mesh go.
+/// The memory for the vertices of a mesh.
 struct Target {
   std::uint32_t mesh = 0;
   float* out = nullptr;  // [vertices, 3]
-  bool written = false;  // afterwards: false where nothing of the mesh changed since the last time
+  // Set afterwards: false if nothing of the mesh changed since it was last written.
+  bool written = false;
 };
 
 /// A frame of a face.
 /// raw    float32[R]; nullptr: the pose is given
-/// pose   what the rig gives, written unless its pointers are null; or what is given: joints and
-///        blend_shapes
-/// turns  float32[turned, 4], w x y z: each is multiplied from the left to what its bone keeps;
-///        nullptr: none
-/// anew   targets are written though nothing changed
+/// pose   output of the rig, unless its pointers are null; without raw an input: joints and
+/// blend_shapes
+/// turns  float32[turned, 4], w x y z: each is multiplied from the left to the rotation of its
+/// bone; nullptr: none
+/// anew   write all targets, even if nothing changed
 struct FaceFrame {
   const float* raw = nullptr;
   std::uint32_t lod = 0;
@@ -56,14 +58,16 @@ struct FaceFrame {
   std::vector<Target> targets;  // no mesh twice
 };
 
-/// One face from frame to frame: it remembers what it wrote where. One thread at a time.
+/// One face from frame to frame. It remembers the last frame to skip unchanged meshes. Not
+/// thread-safe.
 class DirectFace {
  public:
-  /// Fails: invalid_index, invalid_length or invalid_value where the parts do not belong together.
+  /// Fails: invalid_index, invalid_length or invalid_value if the parts do not fit together.
   static core::Result<std::unique_ptr<DirectFace>> make(FaceParts parts);
 
   const FaceParts& parts() const { return parts_; }
-  /// What all bones keep: [bones of chain, 3], [.., 4], [.., 3]; those of rows are overwritten.
+  /// Sets the transforms of all bones: [bones of chain, 3], [.., 4], [.., 3]. Those of the rig's
+  /// bones are overwritten in each frame.
   void keep(const float* location, const float* rotation, const float* scale);
   /// In: mesh  below the number of meshes; base  float32[vertices, 3]
   void set_base(std::uint32_t mesh, const float* base);
@@ -71,13 +75,13 @@ class DirectFace {
   void forget() noexcept;
 
   // The steps of evaluate_faces.
-  /// The rig, the bones and what changed. Allocates nothing.
+  /// Evaluates the rig and the bones, and finds the changes. Allocates nothing.
   void begin(const FaceFrame& frame) noexcept;
   /// After begin: whether the target has to be written.
   bool is_due(const FaceFrame& frame, const Target& target) const noexcept;
-  /// After begin, by any thread: one block of a mesh.
+  /// Writes one block of a mesh. Call it after begin, from any thread.
   void write(const Target& target, std::uint32_t block) const noexcept;
-  /// After all blocks of a target.
+  /// Call it after all blocks of a target.
   void end(const Target& target) noexcept;
 
  private:
@@ -85,7 +89,7 @@ class DirectFace {
     std::vector<std::uint32_t> starts;  // [channels, blocks + 1] into the deltas of the morph
     std::vector<std::uint32_t> active;  // the channels of the morph that are not 0
     std::size_t active_count = 0;
-    std::uint64_t written = 0;  // the frame; 0: never
+    std::uint64_t written = 0;  // the frame in which it was last written; 0: never
     const float* out = nullptr;
   };
 
@@ -98,13 +102,13 @@ class DirectFace {
   FaceParts parts_;
   std::vector<Mesh> meshes_;
   std::uint64_t frame_ = 0;
-  // The rig, and the controls that the pose is of.
+  // The rig's workspace, and the controls of the pose.
   Workspace work_;
   Pose pose_;
   std::vector<float> raw_;
   std::uint32_t lod_ = 0;
   bool has_pose_ = false;
-  // Of the bones of space, in this order: location, rotation, scale.
+  // Of the bones of space, one after the other: location, rotation, scale.
   std::vector<float> own_;
   // Of all bones, now and in the frame before.
   std::vector<float> channels_, last_channels_;
@@ -117,10 +121,10 @@ class DirectFace {
   std::vector<std::uint64_t> bone_changed_, channel_changed_;
 };
 
-/// Evaluates a frame of each face, in as many threads as the work is worth. What is written does
-/// not depend on their number. In:  faces    different ones
-///      frames   of each; what they write may not overlap
-///      threads  so many; 0: as many as the work is worth, and no more than there are cores
+/// Evaluates a frame of each face in several threads. The results do not depend on their number.
+/// In:  faces    different ones
+///      frames   one of each face; their outputs may not overlap
+///      threads  number of threads; 0: as many as the work is worth, at most one per core
 void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> frames,
                     std::size_t threads);
 

@@ -9,14 +9,14 @@
 namespace risorius::rig {
 namespace {
 
-// To begin a thread takes as long as to skin so many vertices.
+// Starting a thread takes as long as skinning this many vertices.
 constexpr std::size_t kWorthAThread = 8192;
 constexpr std::size_t kMostThreads = 64;
 
-// One list of work for all threads: first every face is begun, then come the blocks of its meshes.
-// Who takes a block waits until its face is begun: that is done by a thread that took it before.
-// Threads share it: the caller waits until all is done and not until each of them has begun, which
-// on a busy machine takes longer than a frame. One that comes late finds nothing left to take.
+// One list of work for all threads: first each face is begun, then the blocks of its meshes follow.
+// A thread that takes a block waits until the face is begun, which another thread already does.
+// Threads share ownership: the caller waits until all work is done, not until each thread has
+// started, which takes longer than a frame on a busy machine. A late thread finds nothing left.
 class Work {
  public:
   Work(std::span<DirectFace* const> faces, std::span<FaceFrame> frames)
@@ -52,7 +52,7 @@ class Work {
 
  private:
   struct Mesh {
-    std::size_t face, target, first;  // of its blocks
+    std::size_t face, target, first;  // first of its blocks
   };
 
   void begin(std::size_t f) noexcept {
@@ -75,7 +75,7 @@ class Work {
   std::span<DirectFace* const> faces_;
   std::span<FaceFrame> frames_;
   std::vector<std::atomic<bool>> begun_;
-  std::vector<Mesh> meshes_;  // by their first block; those without blocks are never found
+  std::vector<Mesh> meshes_;  // sorted by first block; meshes without blocks are never found
   std::size_t blocks_ = 0, vertices_ = 0;
   std::atomic<std::size_t> next_{0}, done_{0};
 };
@@ -92,7 +92,8 @@ void evaluate_faces(std::span<DirectFace* const> faces, std::span<FaceFrame> fra
   for (std::size_t t = 1; t < std::min(threads, kMostThreads); ++t) {
     try {
       std::thread([work] { work->run(); }).detach();
-    } catch (const std::system_error&) {  // the system has no more of them: there is this one
+      // The system has no more threads; the calling thread does the work.
+    } catch (const std::system_error&) {
       break;
     }
   }

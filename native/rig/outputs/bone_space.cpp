@@ -13,8 +13,8 @@ std::array<float, 3> transform(const Matrix& m, float x, float y, float z) {
           m[6] * x + m[7] * y + m[8] * z};
 }
 
-/// axes * M(q) * axes^T as a quaternion: the axis turns with the axes, and where they mirror the
-/// sense of the rotation turns round.
+/// axes * M(q) * axes^T as a quaternion. The rotation axis is converted, and the sense of rotation
+/// is reversed if the axes mirror.
 Quaternion convert(const Matrix& axes, float handedness, const Quaternion& q) {
   const std::array<float, 3> v = transform(axes, q.x, q.y, q.z);
   return {handedness * v[0], handedness * v[1], handedness * v[2], q.w};

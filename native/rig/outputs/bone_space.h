@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// BoneSpace: poses of a file's joints to what another program keeps on its bones.
+// BoneSpace: converts poses of a file's joints to transforms of another program's bones.
 #pragma once
 
 #include <array>
@@ -11,29 +11,29 @@
 
 namespace risorius::rig {
 
-/// How the numbers of a file become those of another space: v' = scale * axes * v.
+/// Converts vectors of a file to another space: v' = scale * axes * v.
 struct SpaceConvention {
   EulerConvention euler;
   std::array<float, 9> axes{1, 0, 0, 0, 1, 0, 0, 0, 1};  // rows; orthonormal, may mirror
   float scale = 1;
 };
 
-/// A bone rests in its joint's neutral pose, so it keeps R(n)^-1 T(dt) R(n + dr) S(1 + ds) of a
-/// pose's deltas, in the other space's axes.
+/// A bone rests in the neutral pose n of its joint. A pose with the deltas dt, dr and ds gives it
+/// the transform R(n)^-1 T(dt) R(n + dr) S(1 + ds), in the axes of the other space.
 struct BoneSpace {
   struct Bone {
     std::uint32_t joint;
     std::array<float, 3> neutral_angles;  // in the file's unit
     Quaternion neutral_inverse;           // in the other space
-    std::array<float, 9> place;           // takes a translation of the file to the bone
+    std::array<float, 9> place;           // takes a translation from the file's space to the bone's
   };
   SpaceConvention convention;
   std::uint32_t joint_count = 0;
   std::vector<Bone> bones;
 };
 
-/// In:  neutral_rotations float32[joint_count, 3], the file's unit; bones: the joint of each,
-///      below joint_count
+/// In:  neutral_rotations  float32[joint_count, 3] in the file's unit
+///      bones              the joint of each bone, below joint_count
 BoneSpace make_bone_space(const SpaceConvention& convention, const float* neutral_rotations,
                           std::uint32_t joint_count, const std::vector<std::uint32_t>& bones);
 

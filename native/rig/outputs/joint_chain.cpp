@@ -15,7 +15,7 @@ using Affine = JointChain::Affine;
 
 constexpr Affine kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-// Of columns of length 1, below which a matrix is taken to have no inverse.
+// A matrix with columns of length 1 and a smaller determinant counts as not invertible.
 constexpr double kLeastDeterminant = 1e-9;
 
 Affine product(const Affine& a, const Affine& b) {
@@ -33,7 +33,7 @@ double column_length(const Affine& m, std::size_t c) {
   return std::sqrt(m[c] * m[c] + m[4 + c] * m[4 + c] + m[8 + c] * m[8 + c]);
 }
 
-// Whether there is an inverse; then it is `out`.
+// Whether the matrix is invertible. Out: out  the inverse
 bool invert(const Affine& m, Affine& out) {
   const double c0 = m[5] * m[10] - m[6] * m[9], c1 = m[6] * m[8] - m[4] * m[10],
                c2 = m[4] * m[9] - m[5] * m[8];
@@ -53,7 +53,7 @@ bool invert(const Affine& m, Affine& out) {
 
 std::string bone_name(std::size_t bone) { return "bone " + std::to_string(bone); }
 
-// Parents before those below them. Fails: see make_joint_chain
+// Sorts parents before their children. Fails: see make_joint_chain
 Result<std::vector<std::uint32_t>> sorted(std::span<const std::int32_t> parents) {
   const std::size_t n = parents.size();
   std::vector<std::uint32_t> order;
@@ -85,8 +85,7 @@ Result<std::vector<std::uint32_t>> sorted(std::span<const std::int32_t> parents)
   return order;
 }
 
-// T(location) R(rotation) S(scale), as Blender has it: a quaternion of length 0 is half a turn
-// about x.
+// T(location) R(rotation) S(scale) as in Blender: a quaternion of length 0 is half a turn about x.
 Affine basis(const float* location, const float* rotation, const float* scale) {
   double q[4] = {rotation[0], rotation[1], rotation[2], rotation[3]};
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -144,8 +143,8 @@ void evaluate_chain(const JointChain& chain, const float* location, const float*
                 *s = scale + std::size_t{b} * 3;
     const std::int32_t parent = chain.parents[b];
     const Affine& above = parent < 0 ? kIdentity : work[parent];
-    // rest * basis * rest^-1 is what the bone does in the armature's space: what it is at rest
-    // drops out of parents and children alike.
+    // rest * basis * rest^-1 is the bone's own motion in the armature's space; the rest matrices of
+    // parent and child cancel out.
     if (is_nothing(l, q, s)) {
       work[b] = above;
     } else {

@@ -15,7 +15,7 @@ struct Morph {
   };
   std::uint32_t vertex_count = 0;
   std::uint32_t channel_count = 0;             // length of the weights
-  std::vector<std::uint16_t> channels;         // that have a target here, ascending
+  std::vector<std::uint16_t> channels;         // that have a target in this mesh, ascending
   std::vector<std::uint32_t> channel_offsets;  // [channels + 1] into deltas
   std::vector<Delta> deltas;                   // by channel, then by vertex
 
@@ -28,8 +28,8 @@ struct Morph {
 void evaluate_morph(const Morph& morph, const float* weights, const float* base,
                     float* out) noexcept;
 
-/// values[vertex - first] += weight * delta, of n deltas.
-/// In: first   vertex of values, float32[.., 3]
+/// values[vertex - first] += weight * delta, for n deltas.
+/// In: first   the vertex at the begin of values, float32[.., 3]
 void add_deltas(const Morph::Delta* deltas, std::size_t n, float weight, std::uint32_t first,
                 float* values) noexcept;
 

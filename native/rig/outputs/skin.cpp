@@ -62,13 +62,13 @@ Status check_influences(const Lists& lists, std::uint32_t vertex_count, std::uin
   return core::ok();
 }
 
-// What divides the weights of a vertex, or 0 where it stays.
+// The sum that divides a vertex's weights; 0 if the vertex stays in place.
 float divisor(std::span<const float> weights) {
   const float sum = std::accumulate(weights.begin(), weights.end(), 0.0f);
   return sum > kLeastWeight && std::isfinite(sum) ? sum : 0.0f;
 }
 
-// How often four influences move a vertex.
+// The number of groups of four influences that move a vertex.
 std::uint32_t fours_of(std::span<const float> weights) {
   if (divisor(weights) == 0) return 0;
   const auto none = static_cast<std::size_t>(std::ranges::count(weights, 0.0f));
@@ -79,7 +79,8 @@ std::span<const float> weights_of(const Lists& lists, std::size_t v) {
   return lists.weights.subspan(lists.offsets[v], lists.offsets[v + 1] - lists.offsets[v]);
 }
 
-// In: at  of the first influence of its group, place  of the vertex in the group
+// In: at     index of the first influence of the vertex's group
+//     place  of the vertex in the group
 void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t place, Skin& skin) {
   const std::span<const float> weights = weights_of(lists, v);
   const float sum = divisor(weights);
@@ -93,7 +94,7 @@ void put_vertex(const Lists& lists, std::size_t v, std::size_t at, std::size_t p
   }
 }
 
-// A run of vertices, which begins at `begin` of the block.
+// Adds a run of vertices with equal numbers of influences. In: begin  in the block
 void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_t> vertices,
              std::uint32_t fours, Skin& skin) {
   skin.runs.push_back({static_cast<std::uint32_t>(vertices.size()), fours});
@@ -108,7 +109,7 @@ void add_run(const Lists& lists, std::size_t begin, std::span<const std::uint16_
   }
 }
 
-// The vertices [begin, end), by how many influences they have and then in their order.
+// Adds the vertices [begin, end), sorted by number of influences and then by index.
 void add_block(const Lists& lists, std::uint32_t begin, std::uint32_t end, Skin& skin) {
   std::vector<std::uint32_t> fours;
   for (std::uint32_t v = begin; v < end; ++v) fours.push_back(fours_of(weights_of(lists, v)));
@@ -153,7 +154,8 @@ Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t
   skin.bones.shrink_to_fit();
   skin.weights.shrink_to_fit();
   std::vector<std::uint8_t> used(std::size_t{bone_count} + 1);
-  for (const std::uint16_t bone : skin.bones) used[bone] = 1;  // and that of none
+  // The entry bone_count, for no bone, included.
+  for (const std::uint16_t bone : skin.bones) used[bone] = 1;
   for (std::uint32_t b = 0; b < bone_count; ++b) {
     if (used[b] != 0) skin.bones_used.push_back(static_cast<std::uint16_t>(b));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Skin: how much each bone holds of each vertex of a mesh, and the vertices that follow from it.
+// Skin: the weights of a mesh's vertices on bones, and the deformation of the vertices.
 #pragma once
 
 #include <cstddef>
@@ -13,9 +13,10 @@
 
 namespace risorius::rig {
 
-/// Vertices of one block: so many are read, summed and written while the first cache holds them.
+/// The vertices of one block: few enough that the first cache holds them while they are read,
+/// summed and written.
 inline constexpr std::uint32_t kSkinBlock = 1024;
-/// A vertex whose weights add up to no more than this stays where it is.
+/// A vertex stays in place if its weights add up to at most this.
 inline constexpr float kLeastWeight = 1e-4f;
 
 struct Skin {
@@ -24,20 +25,22 @@ struct Skin {
     std::size_t influence = 0;
   };
   std::uint32_t vertex_count = 0, bone_count = 0;
-  std::vector<simd::SkinRun> runs;        // of each block, by ascending fours
-  std::vector<Block> blocks;              // one more than there are
-  std::vector<std::uint16_t> vertices;    // from the begin of the block, in the order of the runs
-  std::vector<std::uint16_t> bones;       // as simd::SkinPart has them; none is bone_count
-  core::AlignedVector<float> weights;     // the same, each divided by the sum of its vertex
+  std::vector<simd::SkinRun> runs;  // of each block, by ascending fours
+  std::vector<Block> blocks;        // one for each block, and one behind the last
+  // Relative to the block's first vertex, in the order of the runs.
+  std::vector<std::uint16_t> vertices;
+  std::vector<std::uint16_t> bones;    // as in simd::SkinPart; bone_count stands for no bone
+  core::AlignedVector<float> weights;  // the same, each divided by the sum of its vertex's weights
   std::vector<std::uint16_t> bones_used;  // ascending
 
   std::uint32_t block_count() const { return static_cast<std::uint32_t>(blocks.size() - 1); }
   std::size_t memory_bytes() const;
 };
 
-/// In:    offsets  uint32[vertices + 1]: where the influences of each vertex begin
-///        bones    [influences], below bone_count; weights [influences], 0 or more, which need not
-///                 add up to 1. A weight of 0 is none
+/// In:    offsets     uint32[vertices + 1]: the first influence of each vertex
+///        bones       [influences], below bone_count
+///        weights     [influences], 0 or more; they need not add up to 1, and 0 counts as no
+///                    influence
 ///        bone_count  at most 65,535
 /// Fails: invalid_index, invalid_length or invalid_value with the vertex and its influence
 core::Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::uint32_t> offsets,
@@ -45,10 +48,9 @@ core::Result<Skin> make_skin(std::uint32_t vertex_count, std::span<const std::ui
                              std::uint32_t bone_count);
 
 /// One block of a mesh: out = p + (sum of weight * (M p - p)) / sum of weights.
-/// In:  rows    float32[bone_count + 1, kSkinRow] on a cache line: of kernels.skin_rows for
-/// matrices
-///              of evaluate_chain, where what is not finite spoils the vertices that its bone has a
-///              weight of, and a last row of 0
+/// In:  rows    float32[bone_count + 1, kSkinRow], aligned to a cache line: kernels.skin_rows of
+///              the matrices of evaluate_chain, and a last row of 0. A matrix that is not finite
+///              spoils the vertices that have a weight on its bone
 ///      block   below block_count
 ///      points  float32[kSkinBlock, 3], or fewer for the last block
 /// Out: out     float32[kSkinBlock, 3]; may be points

@@ -11,7 +11,7 @@ namespace {
 
 using simd::kFrames;
 
-// A block takes the time of three to four frames, however few it has.
+// A block takes the time of three to four frames, even if it holds fewer.
 constexpr std::size_t kFewest = 4;
 
 PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {
@@ -20,7 +20,7 @@ PoseView frame_of(const Rig& rig, const PoseView& first, std::size_t n) {
           first.animated_maps + n * rig.animated_map_count, first.controls + n * rig.control_count};
 }
 
-// Up to kFrames frames that share one pass over the matrices.
+// Up to kFrames frames that share one pass over the joint matrices.
 class Block {
  public:
   Block(const Rig& rig, Workspace& work, const PoseView& first, std::size_t count)
@@ -40,7 +40,7 @@ class Block {
     detail::place_rows(rig_, lod, work_, work_.rows.data(), first_.joints, count_);
   }
 
-  /// Adds a frame's controls to those of the block.
+  /// Adds the controls of a frame to the controls of the block.
   void take(std::size_t f) noexcept {
     const float* controls = first_.controls + f * rig_.control_count;
     for (std::size_t a = 0; a < work_.active_count; ++a) {

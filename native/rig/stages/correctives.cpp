@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stages that settle the controls: networks, solvers and correctives from the raw ones.
+// The stages that compute all other controls from the raw ones: networks, solvers and correctives.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -21,8 +21,7 @@ float corrective(const Rig& rig, const Psd& psd, const float* values) noexcept {
   return product > 1.0f ? 1.0f : product;
 }
 
-// Faces are sparse in time: what rests at 0 costs no more than being passed over here, eight
-// controls at a time where all of them rest.
+// Most controls of a face rest in most frames. Runs of eight resting controls are skipped at once.
 std::size_t append_active(const float* controls, std::uint32_t begin, std::uint32_t end,
                           std::uint16_t* active) noexcept {
   constexpr std::uint32_t kTogether = 8;
@@ -45,11 +44,11 @@ bool rests_any(const Rig& rig, const Psd& psd, auto rests) noexcept {
   return std::any_of(factors, factors + psd.factor_count, rests);
 }
 
-// Lists the watched correctives that may not be 0: those of which two factors are known not to be,
-// and where a second evaluation has the same active controls, none. To leave the others out takes
-// longer than one evaluation gains by it.
-// In:  active  controls that are not 0, without the correctives
-//      kept    they are those of the evaluation before
+// Lists the watched correctives that may not be 0: those with two known factors that are not 0. If
+// Lists the watched correctives that may not be 0: those with two known factors that are not 0. If
+// a second evaluation has the same active controls, correctives with any resting factor are removed
+// from the list; this test takes longer than one evaluation gains by it.
+//      kept    active equals the list of the evaluation before
 //      rests   whether a control is 0
 // Out: work    firing
 template <class Rests>
@@ -89,12 +88,12 @@ class Correctives {
     for (std::size_t i = 0; i < work_.firing_count; ++i) {
       const Psd& psd = rig_.psds[work_.firing[i]];
       const float value = corrective(rig_, psd, controls_);
-      // 0 times NaN: it is at rest here, as it is where it was left out.
+      // 0 times NaN: the corrective rests here too, because other evaluations leave it out.
       if (std::isnan(value) && rests_any(rig_, psd, rests)) continue;
       set(psd.output, value);
     }
   }
-  // In: from  what they read. The output may be a raw control, which is active by itself.
+  // In: from  the controls to read. The output may be a raw control; it need not be marked active.
   void one(std::uint32_t p, const float* from) noexcept {
     const Psd& psd = rig_.psds[p];
     const float value = corrective(rig_, psd, from);
@@ -118,7 +117,7 @@ class Correctives {
   float* controls_;
 };
 
-// Controls that are not at rest, without the correctives.
+// Lists the controls that do not rest, without the correctives.
 std::size_t list_sources(const Rig& rig, const float* controls, Workspace& work) noexcept {
   const std::size_t n = append_active(controls, 0, rig.raw_count, work.active.data());
   work.raw_active = n;
@@ -131,9 +130,10 @@ std::uint32_t touch_column(const Rig& rig, std::uint32_t column) noexcept {
   return rig.is_half() ? rig.joint_halves[at] : std::bit_cast<std::uint32_t>(rig.joint_values[at]);
 }
 
-// Reads one value of everything that these controls will need. None of these reads waits for
-// another, so with cold caches they are on their way at once, and the pages are known when the
-// columns are read. Frames of a batch need mostly the same: the first one asks for it.
+// Reads one value of every list that these controls will need. The reads do not depend on each
+// other, so that a cold cache loads all of them at once, and the pages are mapped when the columns
+// are read. In a batch only the first frame does it, because the others need mostly the same
+// memory.
 void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> controls,
            Workspace& work) noexcept {
   const std::uint32_t* watches =
@@ -154,8 +154,8 @@ void touch(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> con
   work.touched = sum;
 }
 
-// Touches what these controls will need. Where the evaluation before had the same ones its lists
-// are kept, and what they need is read at once anyway. Out: whether it had
+// Touches the memory that these controls will need, unless the evaluation before had the same ones:
+// its lists are kept, and they are read in one run anyway. Out: whether it had the same ones
 bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
            Workspace& work) noexcept {
   const bool kept = work.firing_for.are(rig, lod, active);
@@ -163,7 +163,7 @@ bool reach(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> act
   return kept;
 }
 
-// The correctives that a control watches; the others are left at 0.
+// Computes the watched correctives; the others stay 0.
 void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
                        float* controls) noexcept {
   std::fill(controls + rig.raw_count, controls + rig.raw_count + rig.psd_count, 0.0f);
@@ -174,8 +174,8 @@ void start_correctives(const Rig& rig, std::uint32_t lod, Workspace& work,
   Correctives(rig, work, controls).watched(lod, active, kept);
 }
 
-// In ascending order: raw, correctives, networks and poses. In: as list_sources left it, but for
-// later steps.
+// Lists active controls in ascending order: raw, correctives, networks and poses. In: active  as
+// list_sources left it, which later steps may have changed
 void list_active(const Rig& rig, bool had_steps, Workspace& work, const float* controls) noexcept {
   std::uint16_t* active = work.active.data();
   std::size_t n = had_steps ? append_active(controls, 0, rig.raw_count, active) : work.raw_active;
@@ -198,7 +198,7 @@ void run(const Rig& rig, std::uint32_t step, std::uint32_t lod, Workspace& work,
   }
 }
 
-// Turns raw controls of frames, so that a control's values lie side by side.
+// Transposes the raw controls of frames, so that the values of one control lie side by side.
 // Out: values  [raw controls, kFrames]; frames beyond count are 0
 void turn_raw(const Rig& rig, const float* raw, std::size_t count, float* values) noexcept {
   static_assert(simd::kFrames == 8);
@@ -221,7 +221,7 @@ bool any_negative_0(const float* values, std::size_t count) noexcept {
   return std::any_of(values, values + count, [](float v) { return v == 0.0f && std::signbit(v); });
 }
 
-// Lists raw controls that are not 0 in any frame. Out: signs  whether any number has a sign
+// Lists raw controls that are not 0 in any frame. Out: signs  whether any number has a sign bit
 std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   const float* values = work.frame_weights.data();
   std::uint64_t all = 0;
@@ -238,7 +238,7 @@ std::size_t list_raw(const Rig& rig, Workspace& work, bool& signs) noexcept {
   return n;
 }
 
-// A corrective of four frames: products, roundings and their order are those of corrective().
+// A corrective of four frames. Products and roundings follow the order of corrective().
 simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
                             const float* values) noexcept {
   simd::Four product = simd::Four::all(psd.weight);
@@ -257,9 +257,9 @@ simd::Four four_correctives(const Psd& psd, const std::uint16_t* factors,
   return simd::Four::load(one);
 }
 
-// The listed correctives of frames.
+// Computes the listed correctives of all frames.
 // In/out: values  [controls, kFrames]
-//         bits    a bit for each control: set where a corrective is not 0 in a frame
+//         bits    a bit for each corrective that is not 0 in some frame
 void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, float* values,
                        std::uint64_t* bits) noexcept {
   for (const std::uint16_t p : firing) {
@@ -275,7 +275,7 @@ void frame_correctives(const Rig& rig, std::span<const std::uint16_t> firing, fl
   }
 }
 
-// What work has of the controls, frame after frame. Out: controls  [count, controls]
+// Copies the controls from work to the frames. Out: controls  [count, controls]
 void write_frames(const Rig& rig, const float* raw, std::size_t count, const Workspace& work,
                   float* controls) noexcept {
   const std::uint32_t correctives_end = rig.raw_count + rig.psd_count;

@@ -10,17 +10,17 @@
 namespace risorius::rig {
 
 /// Turns raw controls into a pose. Allocates nothing.
-/// In:   raw     float32[R]. Any value is taken. Outside [0, 1] joints and shapes follow beyond,
-///               correctives clamp their factors, maps rest outside their intervals. NaN or
-///               infinity spoils every row of the joint groups that have it as a column, its
-///               shapes, maps, networks, setups and the correctives of which no other factor is 0,
-///               and nothing else; check_finite finds it
+/// In:   raw     float32[R], any values. Outside [0, 1] joints and blend shapes extrapolate,
+///               correctives clamp their factors, and maps rest outside of their intervals. NaN or
+///               infinity spoils the rows of joint groups that have the control as a column, its
+///               shapes, maps, networks and setups, and the correctives whose other factors are not
+///               0; check_finite finds such values
 ///       lod     clamped to the last LOD
-///       settle  true: networks, solvers and correctives are evaluated in the order of their
-///               dependency, so that the pose is a function of raw alone; false: networks, then
-///               solvers, then correctives, each reading the rest of those after it, as on the
-///               reference's first call
-/// Out:  pose    every field overwritten
+///       settle  true: networks, solvers and correctives run in the order of their dependencies, so
+///               that the pose is a function of raw alone; false: networks, then solvers, then
+///               correctives; each reads the rest values of later stages, as in the reference's
+///               first call
+/// Out:  pose    every field is overwritten
 /// From: RigLogic; dna-format 12
 void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
               const PoseView& pose) noexcept;
@@ -29,11 +29,11 @@ inline void evaluate(const Rig& rig, const float* raw, std::uint32_t lod, bool s
   evaluate(rig, raw, lod, settle, work, view(pose));
 }
 
-/// The same for count frames or faces, as a small product of matrices that reads each value of the
-/// rig once for several of them. Frame n has the bits of evaluate alone.
+/// Evaluates count frames or faces as a small product of matrices that reads each value of the rig
+/// once for several frames. Frame n has the same bits as with evaluate.
 /// In:  raw   float32[count, R]
 ///      work  of make_batch_workspace
-/// Out: pose  the first frame; the others follow, [count, ...] each
+/// Out: pose  of the first frame; the others follow, [count, ...] each
 void evaluate_frames(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                      bool settle, Workspace& work, const PoseView& pose) noexcept;
 

@@ -10,7 +10,7 @@ namespace risorius::rig {
 
 namespace {
 
-// Whether joint groups are all that writes joints.
+// Whether nothing but joint groups writes joints.
 bool by_groups_alone(const Rig& rig) {
   return rig.joint_stride == 9 && rig.quaternion_joints.empty() && rig.twist_swings.empty() &&
          rig.ml_joints.empty();
@@ -59,7 +59,8 @@ const Pose& Instance::evaluate(const float* raw) noexcept {
   if (has_latency) before_ = pose_.controls;  // of equal size: no allocation
   detail::latent_controls(*rig_, lod_, work_, pose_.controls.data());
   detail::outputs(*rig_, lod_, work_, view(pose_));
-  // What reads later stages follows a frame later: then these bytes have stopped changing.
+  // If a control reads later stages it follows one frame later; the pose rests when nothing has
+  // changed.
   at_rest_ = !has_latency || std::memcmp(before_.data(), pose_.controls.data(),
                                          before_.size() * sizeof(float)) == 0;
   return pose_;

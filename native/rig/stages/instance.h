@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Instance: a face through time, as the reference has it.
+// Instance: a face through time, as in the reference.
 #pragma once
 
 #include <cstdint>
@@ -10,18 +10,18 @@
 
 namespace risorius::rig {
 
-/// One face through time, with the reference's latency: networks, then solvers, then correctives
-/// are evaluated, and each reads what comes after it as the previous evaluation left it.
+/// A face through time with the latency of the reference: networks, solvers and correctives run in
+/// this order, and each reads the results of later stages from the previous evaluation.
 class Instance {
  public:
   explicit Instance(const Rig& rig);
   std::uint32_t lod() const { return lod_; }
-  /// Another level puts all but the raw controls to rest, as in the reference. Clamped to the last
-  /// LOD.
+  /// Changes the level, clamped to the last LOD. Another level puts all controls except the raw
+  /// ones to rest, as in the reference.
   void set_lod(std::uint32_t lod) noexcept;
   const Pose& evaluate(const float* raw) noexcept;
-  /// One value per region of each mesh, mesh after mesh. At 0 the region's networks are not
-  /// evaluated and what they write rests; other values have no effect.
+  /// One value per region of each mesh, mesh after mesh. At 0 the networks of the region are
+  /// skipped and their outputs rest; other values have no effect.
   std::span<const float> masks() const { return work_.masks; }
   /// In: index below the number of masks.
   void set_mask(std::size_t index, float value) noexcept;
@@ -31,7 +31,7 @@ class Instance {
 
   const Rig* rig_;
   std::uint32_t lod_ = 0;
-  bool at_rest_ = false;  // the pose is what raw, still in its controls, gives
+  bool at_rest_ = false;  // the pose belongs to the raw controls and would not change
   Workspace work_;
   Pose pose_;
   std::vector<float> before_;  // the controls of the frame before

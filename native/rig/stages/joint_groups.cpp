@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stage that most of the time goes to: joint attributes as sums of the columns of active
+// The stage that takes most of the time: joint attributes as sums of the columns of active
 // controls.
 #include <algorithm>
 #include <bit>
@@ -10,12 +10,13 @@ namespace risorius::rig {
 
 namespace {
 
-// What listing a column moves: it is read at its control, the end of its group's list is read and
-// written, it is written there and read again by the kernel.
+// Bytes that listing one column moves: the column is read at its control, the end of its group's
+// list is read and written, the column is written to that list, and the kernel reads it again.
 constexpr std::uint64_t kListed =
     sizeof(JointColumn) + 2 * sizeof(std::uint32_t) + 2 * sizeof(simd::Column);
 
-// What the active controls have in the joint groups, as far as anything asks.
+// The columns and values of the joint groups that the active controls read. Only `columns` is
+// counted if the rig keeps no table of reads.
 ControlReads count_active(const Rig& rig, std::uint32_t lod,
                           std::span<const std::uint16_t> active) noexcept {
   ControlReads sum;
@@ -34,8 +35,8 @@ ControlReads count_active(const Rig& rig, std::uint32_t lod,
   return sum;
 }
 
-// By counted bytes: all columns, those at rest included, or the active ones and their listing. A
-// column at rest adds 0 * k to sums that begin at +0, which changes no bit.
+// Compares counted bytes: reading all columns, resting ones included, or listing and reading the
+// active ones. A column at rest adds 0 * k to sums that begin at +0, which changes no bit.
 bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& active) noexcept {
   const std::size_t stride = std::size_t{rig.control_count} + 1;
   const ControlReads& all = rig.control_reads[lod * stride + rig.control_count];
@@ -43,19 +44,20 @@ bool whole_costs_less(const Rig& rig, std::uint32_t lod, const ControlReads& act
   return rest * size + all.columns * sizeof(simd::Column) <= active.columns * kListed;
 }
 
-// Columns a group from which on a list is made where the frame before had the same controls: it
-// will serve more frames than this one. In films of the real face, by AVX2, an evaluation with 32
-// and 60 active takes 0.75 of the time of adding; with fewer columns than this 1.1 to 1.2.
+// Columns per group from which on a list is made if the frame before had the same active controls,
+// because the list will probably serve later frames too. In films of the real face, by AVX2, an
+// evaluation with 32 to 60 active controls then takes 0.75 of the time of adding; with fewer
+// columns 1.1 to 1.2.
 constexpr std::uint32_t kFewOfMany = 6;
 
-// Which way these controls go. Columns that are added in the order of memory need no list and no
-// group's kernel is begun, but a sum is read and written with each column. Measured on two faces:
-// by AVX2 an evaluation takes 0.7 to 1.0 of the time of listing with 4 to 60 columns a group, 0.93
-// to 1.04 with 77 to 149 columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80; of float16 half
-// as many bytes come in for the same sums, and with 64 columns and more listing takes as long or
-// less. By AVX-512, which has a group's sums in registers, 0.86 with one or two columns a
-// group, 1.0 with 5 and 1.1 to 1.3 with 13 to 50.
-// In: seen  the frame before added the columns of these controls
+// Chooses how the columns are visited. Columns that are added in the order of memory need no list
+// and no kernel call per group, but a sum is read and written with each column. Time of adding
+// divided by the time of listing, measured on two faces: by AVX2 0.7 to 1.0 with 4 to 60 columns
+// per group, 0.93 to 1.04 with 77 to 149 columns of 106 rows, and 0.8 to 1.0 with 138 to 295 of 80
+// rows; with float16, which halves the bytes for the same sums, listing wins from 64 columns on; by
+// AVX-512, which keeps the sums of a group in registers, 0.86 with one or two columns per group,
+// 1.0 with 5, and 1.1 to 1.3 with 13 to 50.
+// In: seen  the frame before added the columns of the same controls
 Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                  bool seen, const Workspace& work) noexcept {
   const bool may_read_all = !rig.control_reads.empty();
@@ -70,7 +72,7 @@ Traversal way_of(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_
   return adds ? Traversal::kAdded : Traversal::kListed;
 }
 
-// By ascending control, so that sums have one order.
+// Lists columns by ascending control, so that sums have one order.
 void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16_t> active,
                  Workspace& work) noexcept {
   std::uint32_t* ends = work.column_ends.data();
@@ -87,8 +89,7 @@ void list_active(const Rig& rig, std::uint32_t live, std::span<const std::uint16
   }
 }
 
-// Adds the columns of each active control to work.sums. A row has its terms by ascending control
-// here too.
+// Adds the columns of each active control to work.sums, by ascending control as in a list.
 void add_active(const Rig& rig, std::uint32_t lod, Workspace& work,
                 const float* controls) noexcept {
   std::fill(work.moves.begin(), work.moves.end(), std::uint8_t{0});
@@ -107,7 +108,7 @@ void add_active(const Rig& rig, std::uint32_t lod, Workspace& work,
   }
 }
 
-// The sums of groups that moved become 0 again.
+// Clears the sums of active groups.
 void clear_sums(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   const simd::Rows* rows = work.group_rows.data() + lod * rig.joint_groups.size();
   for (std::size_t n = 0; n < work.live_count; ++n) {
@@ -116,7 +117,7 @@ void clear_sums(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   }
 }
 
-// Calls f(word, bits) with the bits from begin up to end of each word, until it says false.
+// Calls f(word, bits) for each word with its bits from begin up to end, until f returns false.
 template <class F>
 void for_words(std::uint32_t begin, std::uint32_t end, F f) noexcept {
   for (std::uint32_t at = begin; at < end;) {
@@ -127,7 +128,8 @@ void for_words(std::uint32_t begin, std::uint32_t end, F f) noexcept {
   }
 }
 
-// Whether a group has rows in a block that others write: then those must be 0 while it rests.
+// Whether a group shares a block with an active group: then its rows in that block must be 0 while
+// it rests.
 bool shows(const JointGroup& g, const Workspace& work) noexcept {
   bool live = false;
   for_words(g.blocks_begin, g.blocks_end, [&](std::size_t word, std::uint64_t bits) {
@@ -136,7 +138,7 @@ bool shows(const JointGroup& g, const Workspace& work) noexcept {
   return live;
 }
 
-// The first of `count` bits from `at` on that differs from `value`. In: word  gives 64 of them
+// The first of `count` bits from `at` on that differs from `value`. In: word(i)  the i-th 64 bits
 template <class Word>
 std::size_t find_other(std::size_t at, std::size_t count, bool value, Word word) noexcept {
   const std::uint64_t flip = value ? ~std::uint64_t{0} : 0;
@@ -157,7 +159,7 @@ void for_runs(std::size_t count, Word word, F f) noexcept {
   }
 }
 
-// Blocks that groups with active columns reach, and the groups that write them.
+// Marks the blocks that active groups reach, and lists all groups that write into these blocks.
 void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   std::fill(work.live_blocks.begin(), work.live_blocks.end(), 0u);
   const std::uint32_t live = rig.live_groups[lod];
@@ -179,8 +181,8 @@ void mark_blocks(const Rig& rig, std::uint32_t lod, Workspace& work) noexcept {
   work.live_count = n;
 }
 
-// In: way  kListed or kWhole
-// Out: work  also the blocks
+// In:  way   kListed or kWhole
+// Out: work  lists and marked blocks
 void list(const Rig& rig, std::uint32_t lod, Traversal way, std::span<const std::uint16_t> active,
           Workspace& work) noexcept {
   const std::uint32_t live = rig.live_groups[lod];
@@ -199,8 +201,8 @@ void list(const Rig& rig, std::uint32_t lod, Traversal way, std::span<const std:
   work.listed_for.keep(rig, lod, active);
 }
 
-// Lists the columns of these controls, unless they are to be added or work has them listed from the
-// frame before. Out: the way that they go; same  the frame before had these controls and its way
+// Lists the columns of these controls, unless they are to be added or the list of the frame before
+// is still valid. Out: the chosen way; same  the frame before had the same controls and way
 Traversal prepare(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                   bool may_add, Workspace& work, bool& same) noexcept {
   const bool kept = work.listed_for.are(rig, lod, active);
@@ -221,7 +223,7 @@ const simd::Column* listed_columns(const Rig& rig, Workspace& work) noexcept {
   return rig.group_columns.data();
 }
 
-// Places runs of blocks of one LOD, ascending, of all frames.
+// Places runs of blocks of one LOD in ascending order, for all frames.
 class Placer {
  public:
   Placer(const Rig& rig, std::uint32_t lod, const float* rows, float* joints, std::size_t frames)
@@ -233,7 +235,7 @@ class Placer {
         extra_end_(rig.extra_pieces.data() + rig.extra_begins[lod + 1]) {}
 
   std::size_t blocks() const { return (places_ + simd::kPlaces - 1) / simd::kPlaces; }
-  // Extra pieces add to places that the first ones left at 0.
+  // Extra pieces fill attributes that the first pieces left at 0.
   void place(std::size_t first, std::size_t end) noexcept {
     const std::size_t whole = std::min(end, places_ / simd::kPlaces);
     simd::PlacedFrames frames = frames_;
@@ -255,7 +257,7 @@ class Placer {
   }
 
  private:
-  // The extra pieces of blocks below: past those of the last call, in steps that double.
+  // The extra pieces of earlier blocks, found from the last call on in steps that double.
   const simd::Piece* extra_before(std::size_t block) noexcept {
     std::ptrdiff_t step = 1;
     const simd::Piece* from = extra_;
@@ -267,7 +269,7 @@ class Placer {
                                       &simd::Piece::block);
     return extra_;
   }
-  // The last block where it is cut short: what is behind it is another's.
+  // Places the last block if it is incomplete: the memory behind it belongs to something else.
   void place_last(std::size_t block, std::size_t frame) noexcept {
     float last[simd::kPlaces];
     const simd::PlacedFrames one{frames_.from + frame * frames_.from_stride, 0, last, 0, 1};
@@ -315,7 +317,7 @@ void place_rows(const Rig& rig, std::uint32_t lod, Workspace& work, const float*
 
 namespace {
 
-// Out: work.rows, by group, and what list_columns leaves
+// Out: work.rows, by group, and the results of list_columns
 void sum_listed(const Rig& rig, std::uint32_t lod, Workspace& work,
                 const float* controls) noexcept {
   const simd::Column* columns = listed_columns(rig, work);

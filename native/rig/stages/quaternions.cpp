@@ -14,7 +14,7 @@ bool is_identity(const Quaternion& q) {
   return q.x == 0.0f && q.y == 0.0f && q.z == 0.0f && q.w == 1.0f;
 }
 
-// The column's share of a rotation, applied after what is there.
+// Multiplies the column's share of a rotation to the product, after the earlier columns.
 void apply(const QuaternionTerm& term, float v, Quaternion& product) noexcept {
   const Quaternion& full = term.rotation;
   const float identity = full.w >= 0.0f ? 1.0f - v : v - 1.0f;
@@ -49,7 +49,8 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
   for (const std::uint16_t joint : work.straight_joints) {
     rotation_of(rig, joints, joint)[3] = 1.0f;
   }
-  if (rig.euler_joints.empty()) return;  // there may be no joint at all, and no place for one
+  // a rig may have no joint at all, and poses no memory for one.
+  if (rig.euler_joints.empty()) return;
   const EulerConvention& c = rig.euler;
   simd::EulerTurns turns;
   for (std::size_t a = 0; a < 3; ++a) {
@@ -61,7 +62,7 @@ void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work,
                            rig.joint_stride);
 }
 
-// Columns in the order of the file, so that the products are; those at rest are passed over.
+// Multiplies the columns in the order of the file and skips resting ones.
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
                        const PoseView& pose) noexcept {
   if (rig.quaternion_joints.empty()) return;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers, in double: an arc cosine near 1 loses half of the digits that it is given.
+// Radial solvers, computed in double: an arc cosine near 1 loses half of its digits.
 // From: dna-format 12.4
 #include "rig/stages/rbf.h"
 
@@ -14,14 +14,14 @@ namespace {
 
 double square(double v) { return v * v; }
 
-// No rotation at all (0 0 0 0) has neither twist nor swing: NaN, and no pose is near.
+// The quaternion 0 0 0 0 has neither twist nor swing: the result is NaN, and no pose is near.
 void twist_only(double* q, std::uint32_t axis) noexcept {
   const double length = std::sqrt(square(q[axis]) + square(q[3]));
   for (std::uint32_t i = 0; i < 3; ++i) q[i] = i == axis ? q[i] / length : 0.0;
   q[3] /= length;
 }
 
-// What remains of a rotation when its twist is taken off. Half a turn has none to take.
+// Removes the twist from a rotation. Half a turn across the axis has no twist.
 void swing_only(double* q, std::uint32_t axis) noexcept {
   const double t = q[axis], w = q[3];
   const std::uint32_t u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -57,7 +57,7 @@ double kernel(std::uint32_t function, double d, double r) noexcept {
 
 double clamp01(double v) { return v < 0.0 ? 0.0 : (v > 1.0 ? 1.0 : v); }
 
-// Values of the poses before scale and threshold, and their sum.
+// Weights of the poses before scale and threshold. Out: their sum
 double pose_values(const Rig& rig, const RbfSolver& s, const double* inputs, double* near,
                    double* values) noexcept {
   double sum = 0;
@@ -87,7 +87,7 @@ void gather_inputs(const Rig& rig, const RbfSolver& s, const float* controls,
   convert_rbf_inputs(s.distance, s.axis, inputs, s.input_count);
 }
 
-// Beside which a pose's value is multiplied so that they sum to 1.
+// The factor that makes the weights of the poses sum to 1.
 double ratio_of(const RbfSolver& s, double sum) noexcept {
   const bool normalize = sum > 1.0 || (s.always_normalize != 0 && sum != 0.0);
   return normalize ? 1.0 / sum : 1.0;
@@ -147,7 +147,7 @@ void detail::run_solver(const Rig& rig, std::uint32_t index, Workspace& work,
   const double ratio = ratio_of(s, pose_values(rig, s, inputs, near, values));
   for (std::size_t p = 0; p < poses.size(); ++p) {
     const float value = weight_of(poses[p], values[p], ratio);
-    if (!(value > s.threshold)) continue;  // NaN is no pose either, as in the reference
+    if (!(value > s.threshold)) continue;  // NaN is left out as well, as in the reference
     write_pose(rig, poses[p], value, controls);
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Radial solvers: their arithmetic, shared with the compiler that turns over their targets, and
-// what they see in a pose.
+// Radial solvers: their arithmetic, shared with the compiler, which inverts the matrices of their
+// targets; and the weights of their poses for explanations.
 #pragma once
 
 #include <cstddef>
@@ -22,18 +22,17 @@ void convert_rbf_inputs(std::uint32_t distance, std::uint32_t axis, double* valu
 ///     a, b      [count]; rotations are x y z w, one after the other
 double rbf_distance(std::uint32_t distance, const double* a, const double* b,
                     std::size_t count) noexcept;
-/// What a solver makes of a distance.
-/// In: function as in the file: 0 Gaussian 1 exponential 2 linear 3 cubic 4 quintic. A radius of 0
-/// is the limit: 1 at distance 0, else 0.
+/// The weight of a pose at a distance.
+/// In: function  as in the file: 0 Gaussian 1 exponential 2 linear 3 cubic 4 quintic
+///     radius    0: the weight is 1 at distance 0, else 0
 double rbf_kernel(std::uint32_t function, double distance, double radius) noexcept;
 
-/// How near a solver's inputs are to each of its poses. For people who ask why; evaluate() does the
-/// same on its way.
+/// Distances and weights of a solver's poses, for explanations; evaluate() computes the same.
 /// In:  index     below the number of solvers
 ///      controls  float32[controls] of an evaluated pose
 ///      work      of make_workspace
-/// Out: distances, weights  [poses of the solver]: distances in radians where they are angles;
-///      weights as they are written, 0 for what is not above the threshold
+/// Out: distances, weights  [poses of the solver]: distances of rotations are in radians; weights
+///                          as the solver writes them, 0 if not above the threshold
 void solver_poses(const Rig& rig, std::uint32_t index, const float* controls, Workspace& work,
                   double* distances, float* weights) noexcept;
 

@@ -11,55 +11,58 @@
 
 namespace risorius::rig::detail {
 
-/// In: lod of any size. Out: the level that the rig has for it, 0 where it has none.
+/// In: lod of any size. Out: the nearest level of the rig, 0 if it has none.
 std::uint32_t clamp_lod(const Rig& rig, std::uint32_t lod) noexcept;
 
-/// Fills the rest of the controls from the raw ones, and work.active with those that are not 0.
-/// In: controls  [controls]: the raw ones are set, the others are at rest
-///     lod       below the number of LODs, as in everything below
+/// Computes all other controls from the raw ones, and lists in work.active the controls that are
+/// not 0.
+/// In: controls  [controls]: the raw ones are set, the others rest
+///     lod       below the number of LODs, as in all functions below
 void settled_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
 /// The same with the reference's latency.
-/// In: controls  the raw ones are set, the others are those of the frame before
+/// In: controls  the raw ones are set, the others are from the frame before
 void latent_controls(const Rig& rig, std::uint32_t lod, Workspace& work, float* controls) noexcept;
 /// Copies the raw controls, puts the others to rest and calls one of the two functions above.
 void begin(const Rig& rig, const float* raw, std::uint32_t lod, bool settle, Workspace& work,
            float* controls) noexcept;
 
-/// Whether nothing but correctives follows from the raw controls at that LOD.
+/// Whether a LOD has only watched correctives besides the raw controls.
 bool go_together(const Rig& rig, std::uint32_t lod) noexcept;
-/// The controls of up to kFrames frames of such a rig, together: each with the bits of begin.
+/// Computes the controls of up to kFrames frames of such a rig together; each frame has the bits of
+/// begin.
 /// In:  raw       [count, raw controls]
 ///      work      of make_batch_workspace
 /// Out: controls  [count, controls]
 ///      work      frame_weights; active: the controls that are not 0 in a frame
-///      false, and nothing is done, where a raw control is -0: that one reaches its channels where
-///      all channels are looked at, and none where the active controls name theirs
+///      false, and nothing is done, if a raw control is -0: it would reach its channels if every
+///      channel is read, and none if only active controls name their channels
 bool frame_controls(const Rig& rig, const float* raw, std::size_t count, std::uint32_t lod,
                     Workspace& work, float* controls) noexcept;
-/// work.active from work.union_bits, which become 0.
+/// Moves the set bits of work.union_bits to work.active, and clears them.
 void list_union(Workspace& work) noexcept;
 
-/// Runs one operation of the graph of networks; a scatter writes controls, others scratch memory.
+/// Runs one operation of the graph of networks. A scatter writes controls, the others scratch
+/// memory.
 void run_operation(const Rig& rig, std::uint32_t index, std::uint32_t lod, Workspace& work,
                    float* controls) noexcept;
 /// Runs one RBF solver; overwrites the controls that its poses write.
 void run_solver(const Rig& rig, std::uint32_t index, Workspace& work, float* controls) noexcept;
 
-/// The bits that any of eight numbers has, in two halves; kSigns are their signs.
+/// The bits that any of eight numbers has set, in two halves; kSigns are their sign bits.
 constexpr std::uint64_t kSigns = 0x8000'0000'8000'0000;
 inline std::uint64_t bits_of_eight(const float* numbers) noexcept {
   std::uint64_t pairs[4];
   std::memcpy(pairs, numbers, sizeof(pairs));
   return pairs[0] | pairs[1] | pairs[2] | pairs[3];
 }
-/// Whether eight controls, or one of eight frames, are 0, of either sign.
+/// Whether eight controls, or one control in eight frames, are 0 of either sign.
 inline bool rest_eight(const float* controls) noexcept {
   return (bits_of_eight(controls) & ~kSigns) == 0;
 }
 inline float clamp01(float v) { return v < 0.0f ? 0.0f : (v > 1.0f ? 1.0f : v); }
 
-/// Joints, channels and maps from the controls and from work.active.
-/// Out: pose  all but the controls, which are read
+/// Computes joints, channels and maps from the controls and work.active.
+/// Out: pose  everything except the controls, which are read
 void outputs(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 
 /// The joint attributes from the joint groups; overwrites all attributes of all joints.
@@ -67,7 +70,7 @@ void joint_groups(const Rig& rig, std::uint32_t lod, Workspace& work,
                   const PoseView& pose) noexcept;
 
 /// The stages behind the joint groups, which a batch runs frame by frame. rotations() calls the
-/// four functions behind it in their order.
+/// next four functions in their order.
 void rotations(const Rig& rig, std::uint32_t lod, Workspace& work, const PoseView& pose) noexcept;
 void euler_joints(const Rig& rig, std::uint32_t lod, const Workspace& work, float* joints) noexcept;
 void quaternion_joints(const Rig& rig, std::uint32_t lod, Workspace& work,
@@ -77,14 +80,14 @@ void ml_joints(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept
 void channels_and_maps(const Rig& rig, std::uint32_t lod, const Workspace& work,
                        const PoseView& pose) noexcept;
 
-/// The same of up to kFrames frames, as frame_controls left them.
+/// The same for up to kFrames frames, as frame_controls left them.
 /// Out: first  the first frame; the others follow
 void frame_channels_and_maps(const Rig& rig, std::uint32_t lod, std::size_t count,
                              const Workspace& work, const PoseView& first) noexcept;
 
-/// The columns that a frame, or frames together, need: those of active controls, or all where
-/// reading the others costs less than listing. Out: columns by group; those of group i are from
-/// its columns_begin up to work.column_ends[i].
+/// Lists the columns that a frame, or frames together, need: those of active controls, or all
+/// columns if reading them costs less than listing. Out: columns by group; the columns of group i
+/// are from its columns_begin up to work.column_ends[i].
 /// In:  active  controls, ascending
 /// Out: work    also live_blocks and live
 const simd::Column* list_columns(const Rig& rig, std::uint32_t lod,
@@ -104,8 +107,9 @@ inline void store_rotation(const Rig& rig, const Quaternion& q, float* to) noexc
   for (std::size_t a = 0; a < 3; ++a) to[a] = angles[a];
 }
 
-/// Brings the rows of all groups to their joint attributes; attributes without a row, and those of
-/// blocks that rest, become 0. Where work.shown_blocks is kept, blocks that rested before are 0.
+/// Copies the rows of all groups to their joint attributes. Attributes without a row, and
+/// attributes of resting blocks, become 0. If work.shown_blocks is kept, blocks that rested in the
+/// frame before stay 0.
 /// In:  rows    [frames, rows_size]
 ///      work    as list_columns left it
 /// Out: joints  [frames, joints, stride]

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The stage of tables with conditional rows: animated maps, and GUI controls to raw ones and back.
+// Conditional tables: animated maps, and GUI controls to raw controls and back.
 #include "rig/stages/tables.h"
 
 #include <algorithm>
@@ -10,7 +10,7 @@ namespace risorius::rig {
 
 namespace {
 
-// What a run adds at v, the value of its input: one row, or for NaN all of them.
+// Adds the result of a run for the value v of its input: one row, or all rows for NaN.
 void add_run(std::span<const ConditionalRow> run, float v, float* out) noexcept {
   for (const ConditionalRow& row : run) {
     const bool holds = row.from <= v && v <= row.to;
@@ -23,8 +23,8 @@ void clamp(float* values, std::size_t count) noexcept {
   for (std::size_t i = 0; i < count; ++i) values[i] = detail::clamp01(values[i]);
 }
 
-// Few controls move many maps' rows: a run whose input rests is passed over unless it adds
-// something even then. Sums keep the order of the rows; what is left out is + 0.
+// Few controls move the rows of many maps: a run whose input rests is skipped unless it adds
+// something even then. Sums keep the order of the rows; a skipped run would add +0.
 void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   float* out = pose.animated_maps;
   std::fill(out, out + rig.animated_map_count, 0.0f);
@@ -39,7 +39,8 @@ void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   clamp(out, rig.animated_map_count);
 }
 
-// By counted bytes: every channel looks at its control, or the active controls name theirs.
+// Compares counted bytes: every channel reads its control, or each active control names its
+// channels.
 bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
                     std::size_t active) noexcept {
   constexpr std::size_t kLooked = 2 * sizeof(std::uint16_t) + 2 * sizeof(float),
@@ -48,7 +49,7 @@ bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
          active * kNamed + run * sizeof(float) < (shapes - run) * kLooked;
 }
 
-// Calls f(channel) for what a control moves.
+// Calls f(channel) for each channel that a control moves.
 template <class F>
 void for_channels(const Rig& rig, std::uint32_t shapes, std::uint16_t control, F f) noexcept {
   const std::uint32_t end = rig.shape_begins[control + std::size_t{1}];
@@ -84,7 +85,7 @@ void channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> 
   }
 }
 
-// The maps of frames: a run that rests in all of them is looked at once.
+// The maps of all frames. A run that rests in all frames is looked at once.
 // In: values  [controls, kFrames]
 void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::size_t count,
                 float* out) noexcept {
@@ -104,7 +105,8 @@ void frame_maps(const Rig& rig, std::uint32_t lod, const float* values, std::siz
   clamp(out, count * maps);
 }
 
-// As channels, of frames. In: values  [controls, kFrames]; controls  [count, controls]: the same
+// The channels of all frames. In: values  [controls, kFrames]; controls  [count, controls]: the
+// same
 void frame_channels(const Rig& rig, std::uint32_t lod, std::span<const std::uint16_t> active,
                     const float* values, std::size_t count, const float* controls,
                     float* out) noexcept {

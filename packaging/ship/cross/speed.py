@@ -5,8 +5,8 @@ least times and of the medians.
     speed.py FACE.dna FOLDER OTHER [ROUNDS]    folders that `pip install --target` filled, for this
                                                Python
 
-What is timed is what docs/performance.md times: frames of a face of which 60 raw controls change,
-compiling it, reading its file. A quotient above 1: FOLDER is slower than OTHER.
+It times frames of a face with 60 changing raw controls, compiling it, and reading its file, as
+docs/measurements/evaluator.md does. A quotient above 1: FOLDER is slower than OTHER.
 """
 
 import json

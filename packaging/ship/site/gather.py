@@ -24,7 +24,7 @@ FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
 
 def listed(nav: str) -> list[str]:
     """Pages of the project that the navigation names, from the text of mkdocs.yml."""
-    names = re.findall(r"- ([\w./]+\.md)$", nav, re.MULTILINE)
+    names = re.findall(r"- ([\w./-]+\.md)$", nav, re.MULTILINE)
     return [n for n in names if n != "index.md" and not n.startswith("reference/")]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A clip as a value: what it takes, what it refuses, what it is between its frames."""
+"""A clip as a value: accepted and refused input, and values between its frames."""
 
 from __future__ import annotations
 

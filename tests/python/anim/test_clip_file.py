@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips in .rzc files: every bit back, parts, recordings, and what is refused."""
+"""Clips in .rzc files: lossless round trips, parts, recordings, and refusals."""
 
 import os
 import threading
@@ -95,7 +95,7 @@ def test_a_recording_is_the_clip(tmp_path):
         take.event(clip.events[1])
         assert take.frame_count == 1300
         assert not (tmp_path / "take.rzc").exists()
-        # What has been recorded can be read already.
+        # Recorded frames can be read during the recording.
         part = ClipReader(take.part, recover=True)
         assert part.frame_count == 1024
         assert part.read().curves.tobytes() == clip.curves[:, :1024].tobytes()

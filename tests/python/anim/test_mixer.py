@@ -209,7 +209,7 @@ def test_bakes_what_it_evaluates():
 
 
 def test_a_warp_that_falls_plays_backwards():
-    """A clip whose value is its time shows what the line of the warp says: 0.75 - t / 2."""
+    """A clip whose value is its time gives the line of the warp: 0.75 - t / 2."""
     ramp = Clip(["mouth"], [np.arange(25) / 24], 24.0)
     mixer = Mixer(["mouth"], [Layer(ramp, warp=([0.25, 1.25], [0.625, 0.125]))])
     times = np.linspace(0.25, 1.25, 11)
@@ -217,7 +217,7 @@ def test_a_warp_that_falls_plays_backwards():
     np.testing.assert_allclose(shown, 0.75 - times / 2, rtol=0, atol=1e-6)
 
 
-# What a warp takes the place of; it would be ignored.
+# Settings that a warp replaces; they would be ignored.
 BESIDE_A_WARP = (
     {"start": 0.5}, {"end": 3.0}, {"clip_range": (0.25, 0.5)}, {"scale": 2.0}, {"repeat": 2.0},
     {"reverse": True},
@@ -360,7 +360,8 @@ def test_yields_see_values_before_any_of_them():
 
 
 def test_the_seal_of_an_open_jaw_stills_the_lips():
-    """Lips together under a shut jaw do nothing, and hide no teeth; they hold no jaw either."""
+    """The lips-together controls have no effect with a shut jaw: they hide no teeth and hold no
+    jaw."""
     lips = [f"CTRL_expressions.mouthLipsTogether{q}" for q in ("UL", "UR", "DL", "DR")]
     names = [*lips, "CTRL_expressions.jawOpen", "CTRL_expressions.mouthUpperLipRaiseL"]
     for jaw, left in ((0.8, 1 - 0.7 * 0.8), (0.0, 1.0)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joint rigs from expressions: what the written file does, by a reader of its own, and refusals."""
+"""Joint rigs from expressions: the written file in an independent reader, and refusals."""
 
 import copy
 import importlib.util
@@ -39,7 +39,7 @@ from risorius.cli import main
 from risorius.cli.faces import author
 from risorius.controls import arkit
 
-# Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
+# Skinning and morphing from the format's description, without code of risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)
@@ -119,7 +119,7 @@ def test_the_file_is_sound_and_says_what_moves(made):
 
 @pytest.fixture(scope="module")
 def read(folder, made):
-    """What was written, by a reader from bytes on that shares nothing with us."""
+    """The written file in an independent reader of bytes."""
     return dna_bytes.Face((folder / "egg.dna").read_bytes())
 
 
@@ -136,7 +136,7 @@ def test_another_reader_gets_the_same_expression(read, name):
 
 
 def test_eight_levels_by_another_reader(read, made):
-    """Fewer joints and vertices from level to level, all of them the finer one's, and near it."""
+    """Each level has fewer joints and vertices, all from the finer level, and stays near it."""
     _, said = made
     assert read.lod_count == 8
     counts = [len(read.geometry[m[0]]["positions"]) for m in read.lod_meshes]
@@ -164,7 +164,7 @@ def test_eight_levels_by_another_reader(read, made):
 
 
 def test_levels_end_before_the_picture_breaks(folder, tmp_path):
-    """A small face has fewer levels, whose skin stays near the fine one and folds nowhere."""
+    """A small face has fewer levels; their skin stays near the fine one and does not fold."""
     text = (folder / "spec.toml").read_text(encoding="utf-8")
     for name in ("neutral.obj", "shapes"):
         text = text.replace(f'"{name}"', f'"{(folder / name).as_posix()}"')
@@ -397,7 +397,8 @@ def test_joints_alone_come_near(folder, tmp_path):
         error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - wanted(dna, delta), axis=1)
         row = table["CTRL_expressions." + NAMES[name]]
         assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
-        # What goes along an arc is held half the way too, and is a little further off at its end.
+        # Motion along an arc is also fitted half the way, so its error at the end is slightly
+        # larger.
         assert error.max() < 0.12 * np.linalg.norm(delta, axis=1).max() * METRES
         if name.startswith(("mouth", "brow")):  # the others go round an eye, or a hinge
             between = max(
@@ -464,7 +465,7 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["lods"][0]["largest_mm"]
 
-    # Where 200 rounds end differs by what a compiler rounds.
+    # The result of 200 rounds differs with a compiler's rounding.
     assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
     assert (more.rounds, more.emphasis, more.bound) == (300, 3.0, True)

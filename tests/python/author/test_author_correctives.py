@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Correctives: sculpts of several expressions, and those that are found, by a reader of its own."""
+"""Correctives: sculpts of several expressions, and found ones, in an independent reader."""
 
 import itertools
 import json
@@ -29,7 +29,7 @@ THREE = "jawOpen + mouthSmileLeft + mouthSmileRight"
 
 
 def sculpts(positions):
-    """What the egg does where expressions meet: less of the smile, and a bulge of its own."""
+    """The egg in a combination: less smile, and an additional bulge."""
     single = face_shapes.expressions(positions)
     bulge = face_shapes.bump(positions, 3, -5, 3)[:, None] * [0, 0, 0.4]
     two = single["jawOpen"] + 0.6 * single["mouthSmileLeft"] + bulge
@@ -318,8 +318,8 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # Beside the fault, 0.35 mm in the middle, the part that is undone holds the other one up by
-    # 6 mm. What both do elsewhere makes it cheap to undo.
+    # Beside the fault of 0.35 mm the undone expression raises the other one by 6 mm. Its effect
+    # elsewhere makes undoing cheap.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
     allowed = worst([look(plain), look(alone)])
@@ -468,7 +468,7 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     found, _ = corrected
     rows = {one.controls: one.shape for one in found.correctives}
     first = add_correctives(face, found.skin, [((0, 1), rows[0, 1])])
-    # So few joints and so little else that the sheet goes into the ball again.
+    # Too few joints and shapes, so that the sheet enters the ball again.
     rig = make_joint_rig(first, RigOptions(FitOptions(joints=2, rounds=2), tolerance_mm=0.5)).dna
     options = CorrectiveOptions(apart=(("a", "d"),))
     again = correct_again(rig, face, options)
@@ -476,7 +476,7 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     for names in (("a", "b"), ("b", "d")):
         assert depth(skin_of(before, at_one(*names))).max() > 0.35
         assert depth(skin_of(after, at_one(*names))).max() < 0.11
-    # One has its own already, the other gets one; alone each control does what it did.
+    # One pair has a corrective already, the other gets one; single controls stay the same.
     assert (rig.psd_count, again.psd_count) == (1, 2)
     for name in PUSHES:
         assert (skin_of(before, at_one(name)) == skin_of(after, at_one(name))).all()
@@ -517,7 +517,7 @@ def test_correctives_are_told_in_order_and_end_where_they_are_told_to():
 
 
 def test_the_equations_of_a_corrective_are_those_of_every_vertex():
-    """The sums by moments, and those of a matrix with three rows for each vertex."""
+    """The sums by moments equal those of a matrix with three rows for each vertex."""
     random = np.random.default_rng(7)
     joints, vertices = 9, 200
     turns = np.linalg.qr(random.normal(size=(joints, 3, 3)))[0]

@@ -38,7 +38,7 @@ def turned(points, degrees, order="XYZ", back=False):
 
 
 def placed(points):
-    """What FbxNode's manual says of a node's properties, one step after the other."""
+    """The transform of a node's properties by FbxNode's manual, step by step."""
     p = {name: np.array(value) for name, value in PLACE.items()}
     points = (points - p["ScalingPivot"]) * p["Lcl Scaling"] + p["ScalingPivot"]
     points = points + p["ScalingOffset"] - p["RotationPivot"]
@@ -102,7 +102,7 @@ class Egg:
         for number, (name, delta) in enumerate(self.moved.items()):
             channel = 100 + 10 * number
             links.append((channel, BLEND))
-            # A target at half the way that is somewhere else, then the full one.
+            # An in-between target off the straight line, then the full one.
             weights = [50.0, 100.0] if number == 1 else [100.0]
             objects.append(
                 ("Deformer", (I64(channel), f"face.{name}\0\1SubDeformer", "BlendShapeChannel"),
@@ -232,7 +232,7 @@ def test_what_is_no_head_is_one_sentence(tmp_path):
 
 
 def test_damaged_files_are_refused_or_read(tmp_path):
-    """Bytes that are changed anywhere, and files that are cut: nothing but our errors."""
+    """Changed bytes and cut files raise only errors of Risorius."""
     egg = Egg()
     egg.moved = dict(list(egg.moved.items())[:2])
     whole = egg.save(tmp_path / "egg.fbx").read_bytes()

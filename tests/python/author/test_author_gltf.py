@@ -30,7 +30,7 @@ def test_a_head_is_what_was_written(tmp_path, sparse):
 
 
 def outward(mesh):
-    """The share of triangles that show their faces to who stands before the head."""
+    """The share of triangles that face the viewer in front of the head."""
     points = mesh.positions[np.array(mesh.faces)]
     normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     return (
@@ -53,8 +53,8 @@ def test_a_mirror_shows_the_backs_of_no_polygons(tmp_path):
 
 
 def skinned(path, change=None):
-    """As quantizers write a skinned head: the way back to metres is in the skin, the neck is posed,
-    and the node of the mesh stands far away."""
+    """A skinned head as quantizers write it: the scale to metres is in the skin, the neck is posed,
+    and the node of the mesh is far away."""
 
     def posed(document):
         document["nodes"] = [

@@ -39,7 +39,7 @@ def made(name):
 
 
 def read(path, text=""):
-    """What a head's own file becomes, or a spec that names it."""
+    """Read a head's file, or a spec that names it."""
     if text:
         toml = path.with_suffix(".toml")
         toml.write_text(f'[source]\nneutral = "{path.name}"\n{text}', encoding="utf-8")
@@ -56,7 +56,7 @@ def centimetres(dna, mesh=0):
 
 
 def target(dna, control, mesh=0):
-    """Vertices and what they do, cm, of the shape that a control drives."""
+    """Vertices and displacements in cm of a control's shape."""
     channel = list(dna.blend_shape_channel_names).index(control)
     for found in dna.meshes[mesh].blend_shape_targets:
         if found.blend_shape_channel_index == channel:
@@ -65,7 +65,7 @@ def target(dna, control, mesh=0):
 
 
 def strongest(dna, control, mesh=0):
-    """Where the vertex lies that a control moves most, and where it goes, cm."""
+    """Place and displacement in cm of the vertex that a control moves most."""
     vertices, deltas = target(dna, control, mesh)
     at = np.linalg.norm(deltas, axis=1).argmax()
     return centimetres(dna, mesh)[vertices[at]], deltas[at]
@@ -211,7 +211,7 @@ def test_names_that_disagree_with_places_are_told_and_the_mesh_is_not_mirrored(t
     assert any("mirrored file" in n for n in found.odd)
     assert centimetres(found.dna) == pytest.approx(points, abs=1e-4)
     assert strongest(found.dna, "mouthCornerPullL")[0][0] > 2
-    # What is said goes before what is guessed.
+    # A given setting takes precedence over a guess.
     found = read(saved(tmp_path, [swapped]), 'front = "-z"\nup = "+y"')
     assert not any("disagree" in n for n in found.odd)
     assert strongest(found.dna, "mouthCornerPullL")[0][0] > 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A rig has at most as many deltas as came in, and its last line says what that costs."""
+"""A rig has at most as many deltas as its input, and its last line states the trade."""
 
 import re
 

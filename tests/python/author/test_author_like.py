@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A joint rig whose joints, weights and levels another person's face takes over."""
+"""Reusing joints, weights and levels of a joint rig for another person."""
 
 import copy
 import importlib.util
@@ -20,7 +20,7 @@ from risorius.author import (
 from risorius.author.input import spec
 from risorius.base.errors import ArgumentError
 
-# Skinning and morphing from the format's description alone; nothing of risorius.author is in it.
+# Skinning and morphing from the format's description, without code of risorius.author.
 _ORACLE = Path(__file__).parents[3] / "blender_tests" / "support" / "oracle.py"
 _SPEC = importlib.util.spec_from_file_location("blender_oracle_like", _ORACLE)
 oracle = importlib.util.module_from_spec(_SPEC)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the shapes of a head become by their names: controls, and expressions of its own."""
+"""Assigning shapes of a head by their names: controls, and own expressions."""
 
 from __future__ import annotations
 
@@ -94,7 +94,8 @@ def test_odd_names_are_one_sentence(names, words):
 
 @pytest.fixture(scope="module")
 def authored(tmp_path_factory):
-    """The egg with a viseme, a face and a funnel beside ARKit's units, as the command made it."""
+    """The egg with a viseme, an emotion and a funnel beside ARKit's units, authored by the
+    command."""
     folder = tmp_path_factory.mktemp("names") / "egg"
     path = face_shapes.write_all(folder, joints=8, more="rounds = 2\n[lods]\ncount = 1\n")
     positions, faces = face_shapes.head()

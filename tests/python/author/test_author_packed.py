@@ -22,7 +22,7 @@ def triangles():
 
 
 def rows(array, stride):
-    """Bytes of an array whose rows are filled up to a stride."""
+    """Bytes of an array with rows padded to a stride."""
     array = np.ascontiguousarray(array)
     return b"".join(row.tobytes().ljust(stride, b"\0") for row in array)
 
@@ -194,7 +194,7 @@ def test_texture_coordinates_that_no_picture_has_are_one_sentence(tmp_path):
 
 
 def test_damaged_bytes_are_refused_or_read(tmp_path):
-    """Bytes that are changed anywhere, and files that are cut: nothing but our errors."""
+    """Changed bytes and cut files raise only errors of Risorius."""
     whole = head(tmp_path / "whole.glb", packed=True).read_bytes()
     path = tmp_path / "odd.glb"
     random = np.random.default_rng(20261127)

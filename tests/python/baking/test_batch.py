@@ -63,7 +63,7 @@ def make(folder, clips=3, frames=12, faces=FACES, table="", top='output = "out"\
 
 
 def check_outputs(jobs, clips=3, frames=12, faces=FACES, lods=(0, 1)):
-    """Every output is there, whole, and is Rig.evaluate of each frame."""
+    """Check that every output exists, is complete, and equals Rig.evaluate of each frame."""
     names = risorius.load(GOLDEN / "core.dna").raw_control_names
     names += [n for n in risorius.load(GOLDEN / "medium.dna").raw_control_names if n not in names]
     out = jobs.parent / "out"
@@ -480,7 +480,7 @@ class Dask:
 
 
 def lose_the_first(cluster, monkeypatch):
-    """What is done first is lost with its worker, before it was asked for; it is done anew."""
+    """The first result is lost with its worker before it was fetched, so its job runs again."""
     distributed = pytest.importorskip("distributed")
     lost = []
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One thread of linear algebra, where that can be asked for."""
+"""Limiting linear algebra to one thread, where possible."""
 
 import sys
 

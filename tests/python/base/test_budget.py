@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What reading takes is in proportion to what is read: small files that ask for much are refused.
+"""Readers use memory in proportion to their input: small files that demand much are refused.
 
-Every bomb is made here, read as users read files, and its peak of memory is measured by Python's
-own count of what NumPy and the interpreter hold: the same on every machine.
+Every bomb is made here and read through the public readers. Its peak memory is measured by Python's
+own count of allocations, which is the same on every machine.
 """
 
 import json
@@ -24,7 +24,7 @@ MB = 1 << 20
 
 
 def peak_of(work):
-    """Bytes held at most while work() runs, beyond those before; and the error that it raised."""
+    """The peak of additional bytes while work() runs, and its error."""
     error = None
     tracemalloc.start()
     try:
@@ -48,13 +48,13 @@ def refused(path, words):
 
 
 def zeros_array(letter, count, size):
-    """An array of an FBX, of zeros: a thousandth of what it unfolds to."""
+    """A compressed FBX array of zeros, a thousandth of its unpacked size."""
     packed = zlib.compress(bytes(count * size), 9)
     return letter + struct.pack("<III", count, 1, len(packed)) + packed
 
 
 class Raw:
-    """A value whose bytes are given."""
+    """A value with given bytes."""
 
     def __init__(self, data):
         self.data = data
@@ -107,7 +107,7 @@ def test_curves_of_an_fbx_that_unfold_without_end_are_refused(tmp_path, raw_valu
     path = tmp_path / "keys.fbx"
     path.write_bytes(fbx_files.fbx([("Objects", (), objects), ("Connections", (), links)]))
     assert path.stat().st_size < MB
-    # The first curve alone is no animation (its times do not ascend): nothing more is unfolded.
+    # The first curve is invalid (its times do not ascend), so nothing more is unpacked.
     peak = refused(path, "key times that ascend were expected")
     assert peak < 40 * keys
 

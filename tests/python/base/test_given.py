@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers and files that people give: of any size, of another kind, without an end."""
+"""Numbers and files from users: of any size, of a wrong kind, without an end."""
 
 import os
 import threading

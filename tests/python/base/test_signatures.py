@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A file of another kind is called by its kind, in every reader and whatever its name says."""
+"""A file of another kind is named by its kind, in every reader and with any name."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ KINDS = {
 
 
 READERS = {
-    # what reads; the suffix that it takes; kinds that it reads, or says more of
+    # reader; its suffix; kinds that it reads or describes in more detail
     "animation": (importing.read, "csv", ("FBX", "glTF")),
     "json of animation": (lambda p: importing.read(p, kind="json"), "json", ("FBX", "glTF")),
     "clip": (risorius.Clip.load, "rzc", ("clip of",)),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The check of random acting finds what goes through what, and by how much."""
+"""The check of random acting finds penetrations and their depth."""
 
 from __future__ import annotations
 
@@ -104,8 +104,8 @@ def test_hair_under_the_skin_is_seen():
 
 
 def test_where_skin_folds_far_its_other_side_is_found_among_more_triangles():
-    """A hair beyond a roll of skin: of the triangles by its root the nearest is on the far side,
-    seen from inside."""
+    """A hair beyond a fold of skin: the nearest triangle to its root is on the far side and seen
+    from inside."""
     around, along = 24, 5
     angle = 2 * np.pi * np.arange(around) / around
     ring = np.column_stack([np.sin(angle), np.cos(angle)])

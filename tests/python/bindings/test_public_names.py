@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `from risorius import *` gives: each class of the native module that callers meet."""
+"""The names of `from risorius import *`: each native class in the public API."""
 
 import inspect
 

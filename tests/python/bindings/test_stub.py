@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The type stub of the native module names what the module has, no more and no less."""
+"""The type stub of the native module has exactly the names of the module."""
 
 import ast
 import inspect
@@ -40,7 +40,7 @@ def settable_of(body: list[ast.stmt]) -> set[str]:
 
 
 def differences(stub: str, module) -> list[str]:
-    """What the stub lacks or has too much, a line each."""
+    """Missing and superfluous names of the stub, one in each line."""
     top = names_of(ast.parse(stub).body)
     real = {n: v for n, v in vars(module).items() if not n.startswith("_")}
     out = [f"the stub lacks {n}" for n in real.keys() - top.keys()]

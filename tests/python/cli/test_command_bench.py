@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius bench through the front door. What it measures is not judged here."""
+"""risorius bench through the front door. Its measurements are not checked here."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def check(*arguments):
 
 @pytest.fixture
 def two_errors(tmp_path):
-    """A file whose name and whose first joint group do not fit, at known bytes."""
+    """A file with a wrong name and a wrong first joint group at known bytes."""
     data = bytearray((GOLDEN / "tiny_v22.dna").read_bytes())
     entries = struct.unpack_from(">16I", data, 11)
     descriptor, behavior = entries[2], entries[10]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius clip: what it prints, what it writes, how it ends."""
+"""risorius clip: output, written files, exit codes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius convert`: what it writes, what it says, and how it says no."""
+"""The command `risorius convert`: written files, messages, and refusals."""
 
 import json
 import os
@@ -18,7 +18,7 @@ MALFORMED = SHARED / "data" / "golden" / "malformed"
 
 
 def convert(*arguments, stdin=b"", script=None):
-    """The command; with a script, in a process of its own where that runs before it."""
+    """Run the command; with a script, in a separate process after the script."""
     if script is None:
         return command_line.run("convert", *arguments, stdin=stdin)
     begin = f"{script}\nfrom risorius.cli import main; import sys; sys.exit(main())"
@@ -85,7 +85,7 @@ def test_what_the_version_cannot_hold_is_a_line_each(tmp_path):
     lines = words(done).splitlines()
     assert done.returncode == 0
     assert all(line.startswith("risorius: warning: ") for line in lines)
-    # From the format's table of layers: what came after 2.3 and is not empty in this file.
+    # The layers after 2.3 in the format's table that are not empty in this file.
     named = [line.split("has no layer ")[1].split(";")[0] for line in lines]
     assert named == ["rbfb", "rbfe", "jbmd", "twsw", "mlbe"]
     assert "twsw" in risorius.load(out).layers
@@ -250,7 +250,7 @@ FULL = (
 
 @pytest.mark.parametrize("name", ["face.dna", "face.json"])
 def test_a_full_disk_leaves_the_old_file(name, tmp_path):
-    """A limit on file size stands for a full disk: root may write everywhere else."""
+    """A limit on file size simulates a full disk, because root can write everywhere."""
     out = tmp_path / name
     out.write_bytes(b"old")
     done = convert(GOLDEN / "medium.dna", out, script=FULL)

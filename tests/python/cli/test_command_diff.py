@@ -38,7 +38,7 @@ def texts(a, b):
 
 # ---- the property: what differs is never called the same
 
-# What the words must hold for each property; elsewhere the property's own last word.
+# Word that the description of each property must contain; otherwise the last word of its name.
 WORDS = {
     "archetype": "archetype",
     "metadata": r"metadata key",
@@ -126,7 +126,7 @@ def words_for(name):
 
 
 def tells(difference, name):
-    """Whether a difference is about a property, or about what it lies in or holds."""
+    """Whether a difference names a property, its parent or its content."""
     # Where the lists begin that the joints and weights of the vertices are.
     field = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", difference.field)
     name = re.sub(r"meshes\.skin_(joint_indices|weights)", "meshes.skin_offsets", name)
@@ -154,7 +154,7 @@ MOST = {"full": sys.maxsize, "tiny": 4}
 
 
 def spread_changes(dna, most):
-    """At most so many changes of each field, from the first to the last: (name, changed rig)."""
+    """A limited number of changes of each field, spread over the field: (name, changed rig)."""
     changes = {}
     for path, other in every_change(dna):
         changes.setdefault(name_of(path), []).append(other)
@@ -462,7 +462,7 @@ def test_bytes_that_no_layer_reads_are_not_passed_over(tmp_path):
 
 
 def test_what_words_miss_is_said_all_the_same():
-    """The dictionary of metadata hides a key that stands twice."""
+    """The dictionary of metadata hides a duplicate key."""
     facts = json.loads(full().to_json())
     facts["desc1.1"]["metadata"].insert(0, ["a", "hidden"])
     twice = risorius.Dna.from_json(json.dumps(facts))
@@ -525,7 +525,7 @@ def test_the_help_says_what_the_exit_codes_mean():
 
 
 def test_random_bytes_that_can_still_be_read_are_never_the_same(tmp_path):
-    """A patched byte that changes what is read is said, whatever it hits."""
+    """A patched byte that changes the result of reading is always reported."""
     data = saved(full(), tmp_path / "a.dna").read_bytes()
     base = risorius.load(data)
     random = np.random.default_rng(7)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands say of options is true of them."""
+"""Options named in messages of commands exist."""
 
 import argparse
 import ast

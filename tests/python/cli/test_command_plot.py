@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius plot`: what it computes, what it writes, how it says no."""
+"""The command `risorius plot`: computed values, written files, and refusals."""
 
 import importlib.util
 import io
@@ -24,7 +24,7 @@ from risorius.plot.drawing import shade, skeleton
 FILES = sorted(path for path in GOLDEN.glob("*.dna"))
 NAMES = [path.stem for path in FILES]
 
-# Joint names as they stand in files of MetaHumans.
+# Joint names in files of MetaHumans.
 JOINTS = {
     "FACIAL_C_ForeheadSkin": "forehead, brow",
     "FACIAL_R_12IPV_ForeheadOut31": "forehead, brow",
@@ -249,7 +249,7 @@ def test_counts_are_those_of_the_file():
 
 
 class Page(HTMLParser):
-    """Counts images, and fails on what leads out of the page or is left open."""
+    """Counts images, and fails on external links and unclosed elements."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The command `risorius web`: what it puts into the page, and how it says no.
+"""The command `risorius web`: content of the page, and refusals.
 
-That a browser shows it is tried by packaging/ship/web.sh --check."""
+packaging/ship/web.sh --check tests the page in a browser."""
 
 import base64
 import gzip
@@ -40,7 +40,7 @@ def _empty_page(monkeypatch):
 
 
 def parts(page):
-    """What stands in a page: the table, and the bytes of its elements by name."""
+    """Content of a page: the table, and the bytes of its elements by name."""
     found = {}
     for name, text in ELEMENT.findall(page.decode()):
         found[name] = text
@@ -105,7 +105,7 @@ def test_the_page_holds_the_face_and_each_raw_control_once(tmp_path, capsys):
     page = out.read_bytes()
     table, inside = parts(page)
     dna = risorius.load(MEDIUM)
-    # What evaluates is the file without its meshes, which come in fewer bytes beside it.
+    # The page evaluates the file without its meshes, which are stored separately in fewer bytes.
     rig_alone = risorius.load(MEDIUM, layers=pages.RIG)
     assert risorius.load(inside["face"]).to_json() == rig_alone.to_json()
     packed = unpacked(table, inside["geometry"])

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Ctrl-C, a full disk and a reader that leaves end a command in a sentence, and nothing is left.
+"""Ctrl-C, a full disk and a closed pipe end a command with a sentence and leave no file.
 
-Each command waits for a pipe that has a name, in place of a file of its input: whoever opens the
-other end knows that the command is at work, however busy the machine is.
+Each command reads a named pipe instead of an input file. When the other end opens, the command is
+at work, on a busy machine too.
 """
 
 import contextlib

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a name in a file holds is shown by every command, and obeyed by no terminal."""
+"""Every command shows names of a file without control sequences for the terminal."""
 
 import io
 import json
@@ -17,7 +17,7 @@ SPELLED = "\\x1b[2J\\x1b]0;title\\x07\\x9b31m\\u202egnp.exe\\x0d"
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A face, a clip, a table and a mapping whose names are orders to a terminal."""
+    """A face, a clip, a table and a mapping with terminal escape sequences in names."""
     folder = tmp_path_factory.mktemp("evil")
     facts = json.loads(risorius.load(GOLDEN / "core.dna").to_json())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names of shapes: which each vocabulary knows, and what they mean."""
+"""Names of shapes: known names of each vocabulary, and their meaning."""
 
 from __future__ import annotations
 
@@ -31,8 +31,7 @@ def spelled(kind):
     return out
 
 
-# How many names there are; how many of them `author` knew when it had words alone, and clips by the
-# best of their mappings.
+# Number of names; names known to `author` by words alone, and to clips by their best mapping.
 COUNTS = {
     "arkit": (52, 52, 52), "oculus": (15, 0, 15), "vrchat": (18, 0, 7), "vrm0": (17, 3, 17),
     "vrm1": (18, 3, 18), "vroid": (57, 0, 0), "cc4": (155, 16, 27), "cc3": (108, 6, 13),

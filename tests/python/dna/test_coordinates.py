@@ -16,8 +16,8 @@ from coordinates_oracle import System
 
 EPS = float(np.finfo(np.float32).eps)
 FILES = ["tiny_v28", "units", "quatjoints", "medium"]
-# Euler angles of a few degrees to 180, rounded to float32, turn a matrix by less than this; chains
-# of joints add up to DEPTH of them.
+# Bound of the rotation error from rounding Euler angles to float32; chains of joints add up to
+# DEPTH errors.
 ANGLE = 180 * EPS * np.pi / 180
 DEPTH = 40
 
@@ -152,7 +152,8 @@ def raw_controls(dna, rng):
 
 
 def assert_pose_maps(dna, converted, raw, lod):
-    """World matrices of the posed joints; what is no joint bit for bit, but for what solvers do."""
+    """Compare world matrices of posed joints, and all other outputs bit for bit except those of
+    solvers."""
     source, target = oracle.system_of(dna), oracle.system_of(converted)
     before = risorius.Rig(dna).evaluate(raw, lod=lod)
     after = risorius.Rig(converted).evaluate(raw, lod=lod)

@@ -183,7 +183,7 @@ def test_every_prefix_is_an_error_with_an_offset():
 
 
 def test_every_patched_byte_is_read_or_refused():
-    """Never a crash; what is read can be written and evaluated."""
+    """No crash; every accepted file can be written and evaluated."""
     data = small().to_bytes()
     refused = 0
     for at in range(len(data)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every layer, partial load and LOD filter against what the reference's reader decodes."""
+"""Every layer, partial load and LOD filter against the values of the reference's reader."""
 
 import copy
 import zlib
@@ -48,7 +48,7 @@ def load(folder, golden, name):
 
 
 def comparable(view, dna):
-    """Without what the reference's getters derive and what it makes up for older files."""
+    """Remove values that the reference derives or makes up for older files."""
     view = copy.deepcopy(view)
     view.pop("load", None)
     view.pop("ok", None)
@@ -121,9 +121,11 @@ def check(folder, name):
 
 
 def without_kept_ancestors(expected, found):
-    """Ours keeps what a kept joint hangs on, where the reference hangs it on joint 0.
+    """Remove ancestors of kept joints, which Risorius keeps while the reference uses joint 0 as the
+    parent.
 
-    Vertices that such joints move are left out: the reference gives their weight to others.
+    Vertices of such joints are left out, because the reference assigns their weights to other
+    joints.
     """
     joints = found["joints"]
     extra = [name for name in joints if name not in expected["joints"]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""LOD filters: what is left is a whole file that looks and moves as the whole one did."""
+"""LOD filters: the result is a complete file that looks and moves like the original."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def mapping(rows):
 
 
 def many_lods(count):
-    """A face with one joint, channel, map and mesh per LOD, and what drives them.
+    """A face with one joint, channel, map and mesh for each LOD, and their controls.
 
     LOD l lists the joints l and up, the channel and map l, and mesh l.
     """

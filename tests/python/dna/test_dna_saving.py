@@ -27,7 +27,7 @@ def python(script, *arguments, **options):
 def test_a_full_disk_leaves_the_old_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
-    # A limit on file size stands for a full disk: it fails in the middle of the bytes.
+    # A limit on file size simulates a full disk: writing fails in the middle.
     script = (
         "import resource, signal, sys, risorius\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
@@ -46,14 +46,14 @@ def test_a_read_only_folder_leaves_the_old_file(tmp_path):
     path = tmp_path / "face.dna"
     path.write_bytes(OLD)
     tmp_path.chmod(0o555)
-    # Root may write everywhere: the child is nobody, where that is possible.
+    # Root can write everywhere, so run the child as the user nobody if possible.
     script = (
         "import os, sys, risorius\n"
         "dna = risorius.load(sys.argv[1]); dna.name = 'new'\n"
         "if os.getuid() == 0: os.setgid(65534); os.setuid(65534)\n"
         "try:\n    dna.save(sys.argv[1])\nexcept risorius.DnaError as e:\n    print(e.code, e)\n"
     )
-    # Nobody must be able to reach the folder.
+    # The user nobody must be able to reach the folder.
     for folder in tmp_path.parents:
         if folder.stat().st_uid == os.getuid() and folder.name.startswith("pytest-"):
             folder.chmod(folder.stat().st_mode | 0o055)

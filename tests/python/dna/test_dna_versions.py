@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every version from every version: what each can hold, and a word for the rest."""
+"""Converting every version to every version: kept layers, and warnings about others."""
 
 import json
 import warnings
@@ -38,11 +38,12 @@ def test_between_all_versions(source, target):
     data, words = written(dna, target)
     again = risorius.load(data)
     assert again.version == target
-    # 2.1 holds four layers, the others all: a newer layer is written for readers that know it.
+    # 2.1 has four layers, other versions have all: newer layers are written for readers that know
+    # them.
     kept = set(dna.layers) | known(source)
     expected = known(1) if target == 1 else kept | known(target)
     assert set(again.layers) == expected
-    # What is in the file comes back, and where it cannot, its layer is named.
+    # All content comes back, or a warning names its layer.
     missing = {
         name for name in kept if SINCE[name] > max(target, 2) and holds_something(path, name)
     }
@@ -173,7 +174,7 @@ def test_a_newer_minor_is_read_by_the_rules_of_the_newest(minor):
 
 
 def test_extra_downgraded_fixtures_hold_every_layer():
-    """Files of a newer version whose version number was lowered: no layer may be lost."""
+    """Files of a newer version whose version number was lowered: no layer may get lost."""
     require_extra(FIXTURES / "raw_v28.dna", "the reference's fixtures")
     names = [f"RawV2{n}DowngradedFromV2{n + 1}" for n in range(2, 8)]
     for name in names:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""README's commands run as they are written: its blocks are read, and what is quick is done."""
+"""README's commands run as written: the test reads its blocks and runs the quick ones."""
 
 import re
 import shlex
@@ -27,7 +27,7 @@ BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```", (PROJECT / "README.md").read_text()
 
 
 def lines():
-    """Commands of the blocks for a shell, one a line; what a line hands on goes with it."""
+    """Commands of the shell blocks, one in each line, including continued lines."""
     out = []
     for kind, text in BLOCKS:
         if kind == "bash":
@@ -39,7 +39,7 @@ def lines():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """As the demo leaves it: a clone with .venv and build/demo, which is the working folder."""
+    """A clone after the demo, with .venv and build/demo as the working folder."""
     place = tmp_path / "build" / "demo"
     place.mkdir(parents=True)
     dna = risorius.load(GOLDEN / "core.dna")
@@ -55,7 +55,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def command(line):
-    """The words of a line without its comment, None where it is no command of ours."""
+    """The words of a line without its comment, None if it is no command of Risorius."""
     words = shlex.split(line.partition("<<")[0], comments=True)
     words = words[: words.index("||")] if "||" in words else words
     return words[1:] if words[0] == "risorius" else None

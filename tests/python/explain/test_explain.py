@@ -34,8 +34,8 @@ def some_controls(dna, rig, seed):
 
 
 def tolerance(dna, sizes):
-    """float32: 2e-5 of what is summed, of a unit, and of a radian for what went through a
-    quaternion."""
+    """float32: 2e-5 of the summands, of a unit, and of a radian for values converted through
+    quaternions."""
     turn = 1.0 if dna.rotation_unit == "radians" else 57.3
     return 2e-5 * np.add(sizes, [1, 1, 1, turn, turn, turn, 1, 1, 1])
 
@@ -359,7 +359,7 @@ def test_the_command_says_what_it_took_a_name_for(capsys):
     assert "CTRL_expressions.browRaiseInnerL=0.5, CTRL_expressions.browRaiseInnerR=0.5" in (
         captured.err
     )
-    # The oracle: 1.5 * 0.5 * 0.75 of the file's correctives, and what 5 lacks.
+    # Expected by hand: 1.5 * 0.5 * 0.75 for the file's corrective 6, and the missing factor of 5.
     assert "corrective 6 = 0.5625: browRaiseInnerR 0.5 * jawOpen 0.75, weight 1.5" in captured.out
     assert "corrective 5 lacks browRaiseOuterL" in captured.out
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: what comes with Risorius fits the standard controls; what is wrong is said."""
+"""Expressions: those of Risorius fit the standard controls; errors are reported."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_expressions_differ(standard_controls):
 
 
 def test_no_two_are_mistaken_for_each_other(standard_controls):
-    """As directions they lie apart: the same face twice, stronger and weaker, is one expression."""
+    """As directions they differ, because the same face at two strengths is one expression."""
     shown = [e for e in expressions.load().values() if e.weights]
     vectors = np.array([expressions.pose_vector(e, standard_controls) for e in shown])
     vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)

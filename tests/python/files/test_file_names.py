@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Names that somebody else wrote become names of files, and never paths."""
+"""Names from files become file names and never paths."""
 
 import re
 import unicodedata

@@ -81,7 +81,7 @@ def test_one_of_many_threads_has_it_at_a_time(tmp_path):
         thread.join()
     assert broken == []
     assert most[0] == 1
-    # Windows removes no file that another has open: an empty one may stay, which is nobody's.
+    # Windows does not remove a file that is open elsewhere, so an unused empty file may stay.
     assert os.listdir(tmp_path) in ([], [NAME] if os.name == "nt" else [])
 
 

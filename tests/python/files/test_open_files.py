@@ -75,7 +75,7 @@ def test_a_file_that_nobody_else_may_open_stays(save, face):
 
 
 def opened_alone(path):
-    """A file that shares nothing, as a virus scanner or an editor may hold it."""
+    """A file opened exclusively, as by a virus scanner or an editor."""
     import ctypes
     import msvcrt
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""`risorius export`: the file that a client reads moves as the rig does; what cannot be is said.
+"""`risorius export`: the file in a client moves like the rig; limits are reported.
 
 The file is read by gltf_oracle.py, and the rig is evaluated by dna_bytes.py: neither shares code
-with what is tried. packaging/ship/gameface.sh tries three.js and gltf-validator."""
+with the tested one. packaging/ship/gameface.sh tests three.js and gltf-validator."""
 
 import json
 import re
@@ -40,7 +40,7 @@ def controls():
 
 @pytest.fixture(scope="module")
 def face(tmp_path_factory):
-    """A face whose controls are called as ARKit's units need them; a few of those are not there."""
+    """A face with controls for ARKit's units, except a few missing ones."""
     dna = risorius.load(GOLDEN / "medium.dna")
     count = len(dna.raw_control_names)
     dna.raw_control_names = controls()[:count]
@@ -54,7 +54,7 @@ def face(tmp_path_factory):
 
 
 def poses(face):
-    """Name -> (values of raw controls, those that the target is counted from)."""
+    """Name -> (raw controls of the target, raw controls of its base pose)."""
     there = set(risorius.load(face).raw_control_names)
     for name, row in arkit.mapping().items():
         raw = {control: value for control, value in row.items() if control in there}
@@ -70,7 +70,7 @@ def made(face, tmp_path, *more):
 
 
 def places(face):
-    """Each vertex of the file's meshes as a row of the oracle's vertices, by what it is at rest."""
+    """Row of the oracle's vertices for each vertex of the file's meshes, matched at rest."""
     oracle = dna_bytes.Face(face.read_bytes())
     return oracle, oracle.vertices({}) / 100
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Times of captures: units in any spelling, clocks that stand still or run back."""
+"""Times of captures: units in many spellings, clocks that stop or run backwards."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def stopped(form):
 
 
 def set_back(_):
-    """A take of Live Link Face of whose clock the second half is an hour earlier."""
+    """A Live Link Face take whose clock jumps back an hour in the second half."""
     seconds = 36000.0 + np.arange(60) / 30.0
     seconds[30:] -= 3600.0
     return live_link_face(capture(60, FEW), seconds, names=FEW)
@@ -175,7 +175,7 @@ def test_rows_lost_where_the_second_turns_make_no_rate_of_their_own(tmp_path, ba
             assert "give the timecode rate (clip convert --timecode-rate" in str(error)
             continue
         note = next(note for note in found.notes if note.startswith("the timecode counts"))
-        # 48 and 50 without what tells them look like 60, the rate of nearly all phones.
+        # Without seconds, 48 and 50 look like 60, the rate of nearly all phones.
         assert note.split()[3] in (str(base), "60")
 
 

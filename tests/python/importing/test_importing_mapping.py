@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mappings as data: what they may say, how names meet, what is reported."""
+"""Mappings as data: valid content, matching of names, reports."""
 
 from __future__ import annotations
 
@@ -103,12 +103,13 @@ def test_lips_that_a_capture_shuts_are_the_whole_share_of_its_jaw():
         # Below a jaw of 0.02 the share falls to 0: noise over noise would jump from 0 to 1.
         np.testing.assert_allclose(clip.curve(name), [1, 0.5, 1, 0, 0.25, 1, 0], atol=1e-6)
     np.testing.assert_allclose(clip.curve(RIG + "jawOpen"), jaw, atol=1e-6)
-    # What a copy of the mapping does to the jaw parts no lips; it adjusts the share itself.
+    # A changed jaw in a copy of the mapping does not part the lips; the share itself can be
+    # adjusted.
     own = '[controls]\n"jaw*" = { gain = 2.0 }\n"mouthLipsTogether??" = { gain = 0.5 }'
     clip, _ = take.apply(parse_mapping('base = "arkit"\n' + own, "m"))
     np.testing.assert_allclose(clip.curve(lips[0])[:2], [0.5, 0.25])
     np.testing.assert_allclose(clip.curve(RIG + "jawOpen")[0], 1.0)
-    # It can take the share away, and without a jaw nothing is divided.
+    # A mapping can remove the share, and without a jaw nothing is divided.
     none = 'base = "arkit"\nprefix = "CTRL_expressions."\n[shares]\n"mouthLipsTogether**" = ""'
     clip, _ = take.apply(parse_mapping(none, "m"))
     np.testing.assert_allclose(clip.curve(lips[3]), close)
@@ -273,7 +274,7 @@ def test_a_mapping_that_is_not_there_names_those_that_are(tmp_path):
 
 
 def test_a_take_and_the_live_stream_turn_the_same_way():
-    """Both say how the app's angles turn; they were written apart."""
+    """Both convert the app's angles and were written separately."""
     from risorius.live import livelink
 
     rows = importing.load_mapping("live_link_face").rows

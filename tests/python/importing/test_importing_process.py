@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is done to a clip, each against a formula."""
+"""Processing of clips, each compared with a formula."""
 
 from __future__ import annotations
 

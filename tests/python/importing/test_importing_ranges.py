@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Values of another scale, and heads in degrees, are asked about and brought to what they move."""
+"""Values of another scale and heads in degrees are refused with a question and converted by
+options."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""glTF, GLB and FBX: files of Blender's own exporters, and of our writers for what it does not."""
+"""glTF, GLB and FBX: files of Blender's own exporters, and of test writers for other features."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from risorius import importing
 
 DATA = PROJECT / "tests" / "data" / "importing"
 RIG = "CTRL_expressions."
-# What make_blender_files.py keys: frame -> value, straight between.
+# Keys of make_blender_files.py: frame -> value, linear between.
 KEYS = {
     "jawOpen": {1: 0.0, 11: 1.0, 31: 0.25},
     "eyeBlinkLeft": {1: 1.0, 31: 0.0},
@@ -128,8 +128,8 @@ def test_steps_and_splines_are_sampled(tmp_path):
     clip = read_small(tmp_path, [0, 0.5, 1], [0, 1, 1, 0, 0, 1], WEIGHTS, "STEP").clip
     at = clip.frame_times()
     np.testing.assert_array_equal(clip.curve("jawOpen"), np.where((at >= 0.5) & (at < 1), 1, 0))
-    # In, value, out of each key: the cubic 3 t^2 - 2 t^3 with flat ends; and t with slope 1.
-    # What comes before the first key and after the last (9) says nothing.
+    # In, value, out of each key: the cubic 3 t^2 - 2 t^3 with flat ends; and t with slope 1. The
+    # slopes before the first and after the last key (9) are ignored.
     values = [9, 9, 0, 0, 0, 1, 0, 1, 1, 1, 9, 9]
     clip = read_small(tmp_path, [0, 1], values, WEIGHTS, "CUBICSPLINE").clip
     at = clip.frame_times()

@@ -455,6 +455,6 @@ def test_the_report_names_every_curve(tmp_path):
     assert all(name in words for row in report.mapped.values() for name in row)
     assert "more" not in words
     assert max(map(len, text.splitlines())) <= 100 + len(str(path))
-    # What the clip holds beside the rig's controls is said too.
+    # Curves of the clip beside the rig's controls are reported too.
     assert report.bones == list(clip.names) == ["head.yaw"]
     assert "for the bones of head and eyes: 1: head.yaw" in text

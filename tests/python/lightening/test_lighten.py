@@ -73,7 +73,7 @@ def test_what_is_said_of_an_expression_is_so(face):
     row = said["CTRL_expressions.mouthSmileRight"]
     way = vertices(face, raw, row.lod, row.lod) - vertices(light, raw, row.lod, row.lod)
     assert row.largest_mm == pytest.approx(10 * np.linalg.norm(way, axis=1).max(), rel=1e-3)
-    # Joints that stay move as they did, and what hangs on them alone keeps its weights.
+    # Remaining joints keep their motion, and vertices of these joints alone keep their weights.
     same = [face.joint_names.index(name) for name in light.joint_names]
     old, new = risorius.Rig(face).evaluate(raw).joints, risorius.Rig(light).evaluate(raw).joints
     np.testing.assert_array_equal(old[same], new)
@@ -106,7 +106,7 @@ def test_weights_are_fitted_and_both_sides_alike(face):
         squares["fitted"] += float(((vertices(light, raw, 0, 0) - goal) ** 2).sum())
         squares["plain"] += float(((vertices(plain, raw, 0, 0) - goal) ** 2).sum())
     assert squares["fitted"] < 0.35 * squares["plain"]
-    # A neck that is turned takes what it took.
+    # A rotated neck moves the same vertices as before.
     moved = np.zeros((2, 62, 9))
     moved[1, 2, 5] = 15.0
     world = sk.world_matrices(face, moved)
@@ -141,7 +141,7 @@ def test_correctives_that_move_least_leave(face):
     assert all("jawOpen + neck" not in name for name in names)
     assert "eyeBlinkLeft + mouthSmileRight + jawOpen" not in names
     assert len(report.removed_correctives) == 3
-    # The channel of a corrective goes with it, and no other.
+    # Only the channel of a removed corrective is removed.
     none, _ = lighten(face, correctives=2, measured=False)
     assert none.psd_count == 2
     assert none.blend_shape_channel_names == face.blend_shape_channel_names[:-1]
@@ -222,5 +222,5 @@ def test_json_says_all(file, tmp_path):
     said = json.loads(done.stdout)
     assert said["lods"] == [1]
     assert said["after"]["levels"] == 1
-    # A level alone is the same face: nothing is off.
+    # A single level is the same face without error.
     assert max(row["largest_mm"] for row in said["expressions"]) < 1e-3

@@ -44,7 +44,7 @@ def send(port, *steps):
 
 
 def heard(receiver, packets):
-    """The status once so many packets have come."""
+    """The status after a number of packets."""
     ends = monotonic() + PATIENCE
     while monotonic() < ends:
         status = receiver.status()
@@ -55,7 +55,7 @@ def heard(receiver, packets):
 
 
 def record(source, *steps, shaper=None):
-    """What a receiver records of the steps: the clip and its status."""
+    """Record the steps with a receiver. Returns: the clip and the status."""
     with Receiver(source, 0) as receiver:
         take = receiver.record()
         send(receiver.port, *steps)
@@ -168,7 +168,7 @@ def test_two_phones_are_told_apart():
 
 
 def hostile():
-    """Packets that are not what they say."""
+    """Packets with wrong content."""
     good = packed(v6(1, face(i17=0.5)))
     bad = [good[:n] for n in range(0, len(good), 7)] + [good + b"\0", b"\xff" * 300]
     bad.append(good.replace(b"\0\0\0\x24", b"\xff\xff\xff\xff", 1))
@@ -193,7 +193,7 @@ def test_hostile_packets_are_counted_and_change_nothing():
 
 
 def faceless(junk):
-    """How many of the cut packets end where those of a phone without a face do."""
+    """The number of cut packets that equal packets of a phone without a face."""
     head = 1 + 4 + len(PHONE) + 4 + len("iPhone")
     return sum(len(data) in (head, head + 16) for data in junk if data[:1] == b"\x06")
 
@@ -288,7 +288,7 @@ def test_face_cap_and_plain_messages():
 
 
 def faces_of(*messages):
-    """The values of the face that messages make, and the sentences of those that make none."""
+    """The values of the face from messages, and sentences of invalid messages."""
     decoder, refused = osc.Decoder(), []
     for address, values in messages:
         try:
@@ -392,7 +392,7 @@ def test_names_without_end_do_not_stop_a_sender():
     make_up("n", 600)
     for letter in "abcdefghij":
         decoder.feed(units, "here", 1.0)
-        # The names that are sent again and again keep their places among those that come once.
+        # Repeated names keep their places among names that come once.
         values = make_up(letter, 60)
         assert len(values) == 512
         assert [values[name] for name in livelink.NAMES[:52]] == [0.25] * 52
@@ -432,7 +432,7 @@ def test_subjects_that_stream_keep_their_places():
 
 
 def flood(receiver, seconds, at, steps=lambda n: ()):
-    """32 invented subjects, six packets a second each, and beside them what `steps` sends."""
+    """Send six packets a second for each of 32 invented subjects, and the packets of `steps`."""
     for n in range(round(6 * seconds)):
         for k in range(32):
             address = at(k)
@@ -700,7 +700,7 @@ def test_eyes_look_where_only_their_bones_are_sent():
     assert got["CTRL_expressions.eyeLookLeftL"] == pytest.approx(0.5)
     assert got["CTRL_expressions.eyeLookDownL"] == pytest.approx(0.5)
     assert got["CTRL_expressions.eyeLookRightL"] == got["CTRL_expressions.eyeLookUpL"] == 0.0
-    # With the look units themselves the angles say nothing new.
+    # If look units are sent, the angles are ignored.
     got = shaper.apply(frame_of(eyeL__yaw=turn, eyeLookOutLeft=0.1))
     assert dict(zip(got.names, got.values, strict=True)) == {
         "CTRL_expressions.eyeLookLeftL": np.float32(0.1)
@@ -742,7 +742,7 @@ def test_a_recording_is_not_smoothed():
 
 
 def saved(path):
-    """names, times and curves of what the command wrote."""
+    """Names, times and curves of the written file."""
     if path.suffix == ".rzc":
         clip = risorius.Clip.load(path)
         return list(clip.names), clip.frame_times(), clip.curves

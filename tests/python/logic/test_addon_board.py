@@ -47,7 +47,7 @@ def board(sample: tuple[Any, list[str]]) -> Any:
 
 
 def _raw_by_hand(table: Any, gui: np.ndarray) -> np.ndarray:
-    """What the rows say, one after the other."""
+    """The rows of the table, evaluated one after the other."""
     out = np.zeros(table.raw_count)
     done = set()
     for row in table.rows:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's logic of edits, which needs no Blender: what was changed, carried, written back."""
+"""The add-on's logic of edits without Blender: finding, transferring and writing them."""
 
 from __future__ import annotations
 

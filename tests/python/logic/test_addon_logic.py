@@ -534,7 +534,7 @@ def test_sliders_of_a_rotation_reach_below_0_and_rest_at_no_turn():
     assert all((c.rest, c.lowest) == (0.0, 0.0) for c in plans.plan_controls(raw_names))
 
 
-# What pip 23.2 wrote, met by a certificate that signs itself.
+# Output of pip 23.2 for a self-signed certificate.
 _CERTIFICATE = """\
 Looking in indexes: https://127.0.0.1:8443/simple
 WARNING: Retrying (Retry(total=0, connect=None, read=None, redirect=None, status=None)) after \
@@ -572,7 +572,7 @@ def test_the_reason_why_a_package_is_not_installed(said: str, why: str) -> None:
 
 
 def _along(keys: Any, frames: Any) -> Any:
-    """What keys with handles at thirds give at frames."""
+    """Values at frames of keys with handles at thirds."""
     place = np.clip(np.searchsorted(keys.co[:, 0], frames, "right") - 1, 0, len(keys.co) - 2)
     first, after = keys.co[place], keys.co[place + 1]
     t = (frames - first[:, 0]) / (after[:, 0] - first[:, 0])

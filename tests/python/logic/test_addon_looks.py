@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's logic of looks: textures by name, what animated maps do, where a face folds."""
+"""The add-on's logic of looks: textures by name, effects of animated maps, folds of a face."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The add-on's registry of what it remembers: which word ends which entry."""
+"""The add-on's session registry: events and the entries that they empty."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The studio: the picture holds head and shoulders, the lights stand as photographers say."""
+"""The studio: the picture contains head and shoulders, and the lights follow portrait
+photography."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def read(name: str) -> dict[str, Any]:
 
 
 class Reader(ast.NodeVisitor):
-    """Collects the words of one file, and what hides them from translation."""
+    """Collects the strings of a file, and code that hides them from translation."""
 
     def __init__(self, path: Path, only: Sequence[str] = ()) -> None:
         self.path, self.only = path, only
@@ -53,7 +53,7 @@ class Reader(ast.NodeVisitor):
         self.visit(self.tree)
 
     def note(self, node: ast.AST) -> None:
-        """What names are given: by assignments, and by loops over rows that are written out."""
+        """Record values of names from assignments and from loops over literal rows."""
         if isinstance(node, ast.Assign):
             for target in node.targets:
                 if isinstance(target, ast.Name):
@@ -150,7 +150,7 @@ def sources() -> Iterator[Path]:
 
 
 def sources_of_sentences() -> Iterator[Path]:
-    """Files that show nothing themselves and make sentences for those that do."""
+    """Files that make sentences for other files to show."""
     yield ADDON / "native.py"
     for folder in ("scene", "logic"):
         for path in sorted((ADDON / folder).rglob("*.py")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The primary board without Blender: where its handles lead and lie, and what they can pose."""
+"""The primary board without Blender: controls and places of its handles, and reachable poses."""
 
 from __future__ import annotations
 
@@ -198,7 +198,7 @@ class Near:
 
 
 def primary_errors(dna: Any) -> dict[str, Near]:
-    """How near the primary board comes to each expression, on the mesh where that is least."""
+    """Smallest error of the primary board for each expression, on its worst mesh."""
     surface = risorius.Surface(dna, risorius.Rig(dna), lod=1)
     table = primary.table_of(list(dna.raw_control_names))
     named = expressions.load()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faces mixed by region, beside a model written here."""
+"""Faces mixed by region, compared with a model in this test."""
 
 import copy
 import importlib.util
@@ -106,7 +106,8 @@ def test_halves_are_the_mean_of_all_numbers(faces):
 
 
 def test_a_mix_moves_half_way_between_its_parents(faces):
-    """By another reader: an expression of the mix lies between the parents' to a tenth of a mm."""
+    """In an independent reader, an expression of the mix lies between the parents' within a tenth
+    of a mm."""
     one, narrow, _ = faces
     mixed = mix_faces([one, narrow], Mix([0.5, 0.5]))
     values = np.zeros(len(one.raw_control_names), np.float32)
@@ -159,11 +160,11 @@ def test_a_region_takes_the_other_ones_form_to_its_own_place(faces):
     mouth = masks[:, REGIONS.index("mouth")]
     before, after = (np.asarray(d.meshes[0].positions, np.float64) for d in (one, mixed))
     np.testing.assert_allclose(after[mouth < 1e-9], before[mouth < 1e-9], atol=1e-6)
-    # The other face is 30 higher and larger by a fifth, and otherwise the same: nothing is left.
+    # The other face is 30 higher and a fifth larger, otherwise equal: no difference remains.
     np.testing.assert_allclose(after, before, atol=1e-4)
     other = copy.deepcopy(high)
     mesh = other.meshes[0]
-    # One half of its mouth lies further ahead; the mix has that in its own size.
+    # One half of its mouth is farther forward; the mix has this in its own size.
     left = before[:, 0] > 0
     mesh.positions = np.asarray(mesh.positions) + np.outer(0.6 * (left & (mouth > 0.5)), [0, 0, 1])
     other.meshes = [mesh, *other.meshes[1:]]
@@ -431,7 +432,7 @@ def test_pictures_are_read_back_or_refused():
 
 
 def test_extra_mixed_sample_people_have_round_eyes_and_no_flipped_faces():
-    """The man and who is least like him, as faces of shapes, wholly and region by region."""
+    """The man and the most different person as blend shape faces, whole and by region."""
     both = [sample_people.assembled(name)[0] for name in ("man", "girl")]
     masks = Masks(both[0])
     mixes = [Mix([1.0, 1.0])]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What mixing, solving and making faces takes is in proportion to their files: counts that a file
-states or lists make no tables of all by all."""
+"""Mixing, solving and authoring use memory in proportion to their files: large counts in a file
+make no dense tables."""
 
 import copy
 import struct
@@ -27,7 +27,7 @@ BASE, BYTES_PER_BYTE = (
 
 
 def peak_of(work):
-    """What work() returns, and the bytes that it held at most."""
+    """The result of work(), and its peak of bytes."""
     tracemalloc.start()
     try:
         return work(), tracemalloc.get_traced_memory()[1]
@@ -89,7 +89,7 @@ def _other_skin(dna):
 
 
 def _groups_that_share_a_joint(dna):
-    """High and narrow beside low and wide; in another order, so that they have to be joined."""
+    """A tall narrow group beside a low wide one, in another order, so that they must be joined."""
     rows, columns = np.arange(9 * len(dna.joint_names)), np.arange(len(dna.raw_control_names))
     dna.joint_groups = [group(rows[1:], columns[:1]), group(rows[:1], columns)]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Faces of every layer mixed: what is alike stays byte for byte, what differs is one sentence."""
+"""Faces of every layer mixed: equal data stay byte for byte, differences give one sentence."""
 
 import copy
 
@@ -41,7 +41,7 @@ def test_every_face_mixes_with_a_moved_copy_and_keeps_what_they_share(name):
     for m, mesh in enumerate(mixed.meshes):
         before = np.asarray(face.meshes[m].positions)
         np.testing.assert_allclose(mesh.positions, before + np.float32([0, 0.5, 0]), atol=1e-5)
-    # But for what was moved, the file is the face's, of all layers.
+    # Except moved values, the file equals the face in all layers.
     meshes = []
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):
         mesh.positions = own.positions
@@ -167,7 +167,7 @@ def test_faces_without_some_layers_mix_with_their_like_alone(layers, tmp_path, c
 
 
 def test_a_region_of_teeth_alone_has_a_size():
-    """Nothing of the skin moves, so all of it is skull."""
+    """No part of the skin moves, so all of it is skull."""
     face = risorius.load(GOLDEN / "ml.dna", layers="geometry")
     mixed = mix_faces([face, moved(face)], Mix([0.5, 0.5], {"mouth": {1: 1}}))
     for mesh, own in zip(mixed.meshes, face.meshes, strict=True):

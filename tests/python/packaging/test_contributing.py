@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hooks and workflows run what the tests run; the scripts of the workflows are there."""
+"""Hooks and workflows run the same checks as the tests, and the scripts of the workflows exist."""
 
 import importlib.util
 import os

@@ -29,7 +29,7 @@ def _python(code):
 
 
 def _left(mark):
-    """Processes whose command line holds the mark."""
+    """Processes with the mark in their command line."""
     done = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True)
     return [line for line in done.stdout.splitlines() if mark in line]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the packaging scripts compute: names of wheels in the zip, and the version matrix."""
+"""Results of the packaging scripts: names of wheels in the zip, and the version matrix."""
 
 import importlib.util
 import os

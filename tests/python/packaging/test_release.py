@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What release.sh is made of: refusals, notes, zips for each platform, their repository, sums."""
+"""Parts of release.sh: refusals, notes, zips for each platform, repository, checksums."""
 
 import hashlib
 import importlib.util

@@ -23,12 +23,12 @@ def test_every_page_of_the_navigation_and_all_that_it_links_to_is_there(tmp_path
     gather = _part("gather")
     nav = (PROJECT / "packaging" / "ship" / "site" / "mkdocs.yml").read_text(encoding="utf-8")
     names = gather.listed(nav)
-    written = {p.relative_to(PROJECT).as_posix() for p in (PROJECT / "docs").glob("*.md")}
+    written = {p.relative_to(PROJECT).as_posix() for p in (PROJECT / "docs").rglob("*.md")}
     assert written <= set(names)
     gather.copy_pages(tmp_path, names)
     for name in names:
         text = (tmp_path / name).read_text(encoding="utf-8")
-        # A menu's > that comes to stand first in its line would be a quotation.
+        # A menu's > at the start of a line would become a quotation.
         assert not [line for line in text.splitlines() if line.startswith("> ")], name
 
 

@@ -121,7 +121,7 @@ def test_a_texture_shrinks_to_the_means_of_its_blocks(shape):
 
 
 class _Nobody:
-    """A body where nobody is painted."""
+    """A body for tests without painting."""
 
     positions, units = np.zeros((0, 3)), {}
 
@@ -171,7 +171,7 @@ def skinned(dna, rig, raw, mesh_index, lod):
 
 
 def _moves(dna, joints):
-    """float64[J, 4, 4]: from where joints rest to where they are."""
+    """float64[J, 4, 4]: from rest to posed joints."""
     rest = np.asarray(dna.neutral_joint_translations, float)
     (cx, cy, cz), (sx, sy, sz) = (f(np.radians(joints[:, 3:6])).T for f in (np.cos, np.sin))
     zero, one = np.zeros(len(rest)), np.ones(len(rest))
@@ -195,7 +195,8 @@ def _moves(dna, joints):
 
 
 def _rows():
-    """The rows of arkit.toml; what takes back a share of another control, with that one at 1."""
+    """The rows of arkit.toml; a control that takes back a share of another one, with that one at
+    1."""
     whole = shares()
     return {
         unit: row | {whole[name]: 1.0 for name in row if name in whole}
@@ -204,8 +205,8 @@ def _rows():
 
 
 def _wanted(data, body, unit, row):
-    """float64[V, 3]: the unit of the data, of lips that an open jaw brings apart with the jaw; lids
-    and eyes do what their own tests ask for."""
+    """float64[V, 3]: the unit of the data, for lips with the open jaw; lids and eyes as in their
+    own tests."""
     units = [unit, "jawOpen"] if set(row) & set(shares()) else [unit]
     out = body.carried(sum(data.face_unit(one, len(body.positions)) for one in units))
     names = {name.rsplit(".", 1)[-1]: weight for name, weight in row.items()}
@@ -278,7 +279,7 @@ def lips_apart(dna, *poses):
 
 
 def _takes(*values):
-    """What captures of jawOpen and mouthClose give, by controls without prefix."""
+    """Controls without prefix from captured jawOpen and mouthClose."""
     for jaw, close in values:
         curves = {"jawOpen": ([0.0], [jaw]), "mouthClose": ([0.0], [close])}
         clip, _ = importing.import_curves(curves)
@@ -325,7 +326,7 @@ def test_extra_the_packed_face_gives_back_its_units(sample, packed):
         wanted = _wanted(data, body, unit, row)
         for part in parts:
             number = dna.mesh_names.index(part.name)
-            # At rest its sides differ, which its joints know nothing of: what counts is the way.
+            # At rest its sides differ, which its joints do not, so compare the displacement.
             rest = np.asarray(dna.meshes[number].positions, float)
             goal = rest + part.carry(wanted) * blend_shape_face.CM
             lod = 1 if "_lod1_" in part.name else 0
@@ -481,7 +482,7 @@ def test_an_unknown_person_is_one_sentence(tmp_path, capsys):
 
 @pytest.fixture
 def asked(monkeypatch):
-    """What the command asks build_sample for."""
+    """The arguments of build_sample from the command."""
     calls = []
 
     def build_sample(path, **options):
@@ -552,7 +553,7 @@ def test_joints_of_several_sizes_are_kept_side_by_side(tmp_path, monkeypatch):
 
 
 def test_a_displacement_is_carried_by_the_change_of_form():
-    """A sheet that is stretched and sheared: what moves along an edge still does so."""
+    """On a stretched and sheared sheet, motion along an edge stays along that edge."""
     side = 12
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     before = np.column_stack([x.ravel(), y.ravel(), 0.02 * (x**2).ravel()]).astype(float)
@@ -594,7 +595,7 @@ def test_a_missing_wheel_is_one_sentence(tmp_path, monkeypatch):
         source.Source(other)
 
 
-# What stands in for pip: it writes a part where pip keeps it, waits to be looked at, and fails.
+# A fake pip: it writes a part of a file, waits for the test, and fails.
 PART = """
 import os, sys, tempfile, time
 path = os.path.join(tempfile.mkdtemp(), "part.whl")

@@ -25,7 +25,7 @@ def _height(points, middle, radius, gaze):
 
 
 def test_the_eye_has_the_measures_of_real_ones():
-    """In millimetres, where the iris is as large as that of people."""
+    """In millimetres, scaled to a human iris."""
     size = LIMBUS / eyeball.IRIS
     assert 12 <= size <= 15.5  # the ball of people has 12, that of the data up to 16
     top = size * float(eyeball.surface(np.zeros(1))[0])
@@ -84,7 +84,7 @@ def test_the_picture_of_an_eye_gives_most_of_itself_to_the_iris():
 
 @pytest.fixture(scope="module")
 def faces():
-    """The girl, and the one whom all people are made after."""
+    """The girl, and the man after whom all people are made."""
     girl = sample_people.body("girl")
     return {"girl": girl, "model": girl.man}, with_eyeballs(sample_people.data().base_mesh())
 
@@ -95,7 +95,7 @@ def face(request, faces):
 
 
 def _posed(face, side, **values):
-    """The grid of the lids as on LOD 0, and what the eye is turned by; values by control."""
+    """The grid of the lids at LOD 0, and the rotation of the eye, for given controls."""
     eye, letter = face.eyes.lids[side], side.upper()
     controls = {f"{name}{letter}": value for name, value in values.items()}
     grid = eye.grid(face.positions).copy()
@@ -118,7 +118,7 @@ LOOKS += [{"eyeLookLeft": 0.5, "eyeLookDown": 0.5}, {"eyeLookRight": 0.5, "eyeLo
 
 
 def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
-    """What is around the rim, where several controls push at once; the eye came through it."""
+    """The skin around the rim when several controls push it at once."""
     for side, eye in face.eyes.lids.items():
         for pose in (
             {"eyeCheekRaise": 1.0, "eyeSquintInner": 1.0},
@@ -132,7 +132,7 @@ def test_extra_a_cheek_that_is_pushed_up_lies_over_the_eye(face):
 
 
 def test_extra_no_eye_goes_through_its_lids(face):
-    """At each gaze, open, half closed and closed: 0.5 mm at most where they touch."""
+    """At each gaze, open, half closed and closed: at most 0.5 mm of penetration."""
     for side, eye in face.eyes.lids.items():
         gaze = eyeball.gaze(side)[:, 2]
         for look in LOOKS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sample's controls beyond ARKit's, on the real data, where they can be had."""
+"""The sample's controls beyond ARKit's, on the real data if available."""
 
 from pathlib import Path
 
@@ -41,8 +41,8 @@ def test_extra_all_but_one_of_the_standard_controls_are_there(motions):
 
 
 def test_extra_each_control_moves_something_that_no_other_does(motions):
-    """At least 0.5 mm, and a cosine of at most 0.95 with the motion of any other; of what closes
-    lips under the open jaw."""
+    """At least 0.5 mm, and a cosine of at most 0.95 with the motion of any other; for controls that
+    close the lips, with the jaw open."""
     names, moved = motions
     assert (np.linalg.norm(moved, axis=2).max(axis=1) >= 0.5 * MM).all()
     flat = moved.reshape(len(names), -1)
@@ -99,7 +99,8 @@ def test_extra_what_closes_lips_needs_an_open_jaw(man):
 
 
 def test_extra_no_reaction_lifts_the_lower_lip_over_the_upper_one(man):
-    """At rest the lips are shut: what closes a mouth that the jaw has opened may not be in it."""
+    """At rest the lips are shut, so a reaction must not contain controls that close an opened
+    mouth."""
     body = man.groups["body"]
     middle = body[np.abs(man.positions[body, 0]) < 0.02]
     still = np.zeros_like(man.positions)

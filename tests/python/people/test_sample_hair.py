@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hair of the sample people: where it grows, how cards lie, and that they stay on the skin."""
+"""Hair of the sample people: growth, orientation of cards, and contact with the skin."""
 
 import zlib
 from dataclasses import replace
@@ -119,7 +119,7 @@ def test_neither_a_turned_strip_nor_a_curl_goes_into_the_skin(ball):
 
 
 def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
-    """Where a hair passes the way out of the skin, what was its left would be its right."""
+    """Where a hair turns past the normal of the skin, its left and right would be swapped."""
     roots = ball.scattered(np.ones(len(ball.positions)), 0.4, np.random.default_rng(3))
     roots = roots.taken(np.arange(1))
     points = np.array([[[0, 0, 0], [0.1, 0, 0.1], [0.1, 0, 0.3], [-0.1, 0, 0.3], [-0.3, 0, 0.2]]])
@@ -130,7 +130,7 @@ def test_a_card_that_leans_back_over_its_root_is_no_bow(ball):
 
 @pytest.mark.parametrize("who", ["man", "fighter", "woman", "elder"])
 def test_hairs_of_a_card_fade_out_to_its_sides(who):
-    """A card whose hairs stand evenly, or are cut off by its edge, is seen to be a rectangle."""
+    """A card with even hairs, or hairs cut off at its edge, would look like a rectangle."""
     cover = paint_strands(people.PEOPLE[who])[..., 3]
     curly = who in ("fighter", "woman")
     for kind, thin in (("beard", slice(0, 8)), ("scalp", slice(0 if curly else 5, 8))):
@@ -335,7 +335,7 @@ def haired():
 
 
 def test_extra_a_fringe_hangs_before_the_forehead_and_ends_over_the_brows():
-    """More hair before the forehead than without, down to where it is asked, never at the eyes."""
+    """A fringe has more hair on the forehead, down to the wanted height, and never at the eyes."""
     _, parts, body = sample_people.assembled("man")
     base, even = sample_people.data().base_mesh(), body.man.positions
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)

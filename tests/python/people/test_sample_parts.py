@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Teeth, lips, the shirt and sides that differ, on the real data where they can be had."""
+"""Teeth, lips, the shirt and sides that differ, on the real data if available."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ def test_extra_there_are_28_single_teeth_as_large_as_those_of_people(base):
 
 
 def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
-    """What the jaw carries keeps its form: a small lip does not turn inside out."""
+    """Parts that the jaw carries keep their form: a small lip does not turn inside out."""
     rng = np.random.default_rng(5)
     before = rng.uniform(-1, 1, (60, 3))
     before[:20] *= 0.2
@@ -63,7 +63,7 @@ def test_a_jaw_turns_on_everybody_as_it_does_on_the_man():
     )
     found, shift = rigid.rigid_fit(after, after + way)
     assert found == pytest.approx(turn, abs=1e-3)
-    # Beside what it turns it moves no place by more than the 0.5 mm where it is not asked.
+    # Outside the rotated part it moves no vertex by more than the 0.5 mm limit.
     assert np.abs(after @ found.T + shift - after - way).max() < 0.006
 
 

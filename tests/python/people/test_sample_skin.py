@@ -58,7 +58,7 @@ def test_the_face_gets_the_texture_and_nothing_lies_on_another(islands):
         own = [f for f in islands.faces if label[f[0]] == number]
         count += raster.Raster(Polygons(own, own, out, len(out)), out, 256).covered
     assert count.max() == 1
-    # Upright: what was farthest along u lies lowest, and the middle is wider than the rim.
+    # Upright: the point farthest along u lies lowest, and the centre is wider than the rim.
     rows = face.reshape(9, 9, 2)
     assert (np.diff(rows[..., 1], axis=1) < 0).all()
     widths = np.diff(rows[:, 0, 0])
@@ -225,7 +225,7 @@ def test_the_relief_has_what_a_mesh_rounds_off(mask):
     assert np.abs(found[near(texels, -0.3, -0.3, 0.2)]).max() < 1e-4
     assert form.hollows(found)[near(texels, 0.3, -0.3)].min() > 0.3
     assert form.hollows(found)[near(texels, -0.3, -0.3)].max() < 1e-3
-    # Where lips meet nothing is moved.
+    # Nothing moves where the lips meet.
     dug = flat - 0.03 * groove(face.x + 0.3, face.y + 0.4)[:, None] * [0, 0, 1]
     meet = form.form(polygons, dug, face, texels)[near(texels, 0, -0.72, 0.02)]
     assert np.abs(meet).max() < 1e-5

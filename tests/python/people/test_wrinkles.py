@@ -30,7 +30,7 @@ def _module(name):
 
 @pytest.fixture(scope="module")
 def sheet():
-    """A flat square of quadrilaterals whose texture lies as it does; x and y from 0 to 1."""
+    """A flat square of quads with UV coordinates equal to x and y, from 0 to 1."""
     x, y = np.meshgrid(np.linspace(0, 1, SIDE), np.linspace(0, 1, SIDE))
     positions = np.column_stack([x.ravel(), y.ravel(), np.zeros(SIDE**2)])
     faces = [
@@ -96,7 +96,7 @@ def test_folds_run_along_their_lines(way):
     inner = heights[20:76, 30:86]
     assert inner.min() < -0.9
     assert inner.max() <= 0
-    # way 0: lines along x, so that neighbours in x are alike and those in y are not.
+    # way 0: lines along x, so neighbours in x are similar and neighbours in y are not.
     along = np.abs(np.diff(inner, axis=1 - way)).mean()
     across = np.abs(np.diff(inner, axis=way)).mean()
     assert across > 4 * along
@@ -232,7 +232,7 @@ def test_no_fold_is_made_where_two_sides_meet(sheet):
         )
 
     assert max(rows[:, 0].max() for rows in shared(way).values()) < 0.01
-    # What both push together is there with both, each side's share on its own.
+    # Folds of both sides appear with both controls, and each side's share with its own.
     together = positions * [[-0.4, 0, 0]]
     found, whole = shared(together), surface.folds(positions + together)
     np.testing.assert_allclose(found["L"] + found["R"], whole, atol=1e-9)

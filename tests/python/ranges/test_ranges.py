@@ -36,7 +36,7 @@ def bump(count, at, width, height):
 
 
 def performance():
-    """A man who speaks and blinks, and whose phone never sees his eyes shut: [frames, columns]."""
+    """A speaking, blinking man whose phone never reports shut eyes: [frames, columns]."""
     count, random = 1100, np.random.default_rng(5)
     lids = 0.05 + sum(
         bump(count, at, 7, height - 0.05) for at, height in zip(BLINKS, HEIGHTS, strict=True)

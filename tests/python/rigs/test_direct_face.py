@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finished vertices from Python: against the oracle, what is written when, and wrong arguments."""
+"""Final vertices from Python: compared with the oracle, rules of writing, and wrong arguments."""
 
 import re
 import sys

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Joint groups made anew: the same function, and only what is small and foreign taken out.
+"""Rebuilt joint groups: the same function, without small values of other regions.
 
-What a file's joint groups mean is read here a second time, straight from the format: a dense
-matrix for each LOD, in which the last writer of a row wins.
+The joint groups of a file are read independently from the format: a dense matrix for each LOD, in
+    which the last writer of a row wins.
 """
 
 import copy
@@ -41,7 +41,7 @@ def turned(dna):
 
 
 def matrix(dna, lod, width=None):
-    """float64[joints * 9, controls]: what the rows that are no quaternion's do at a LOD."""
+    """float64[joints * 9, controls]: the rows at a LOD that belong to no quaternion."""
     out = np.zeros((len(dna.joint_names) * 9, width or control_count(dna)))
     quaternions = turned(dna)
     for group in dna.joint_groups:
@@ -184,7 +184,7 @@ def test_random_faces_with_repeated_rows_and_columns(width):
     out, _ = edit.regroup(dna, timed=0)
     for lod in range(dna.lod_count):
         wide = control_count(dna)
-        # A column that stands twice is added to one before it is rounded.
+        # Duplicate columns are added before rounding.
         np.testing.assert_allclose(
             matrix(dna, lod, wide), matrix(out, lod, wide), rtol=2**-23, atol=0
         )
@@ -235,7 +235,7 @@ def test_faces_whose_groups_overlap(seed):
         assert rigs[0].joint_indices_written.tolist() == rigs[1].joint_indices_written.tolist()
         for lod in range(dna.lod_count):
             a, b = (rig.evaluate_batch(raw, lod=lod) for rig in rigs)
-            # Columns that stand twice are added before they are rounded: sums of 14 below 3 * 1.5.
+            # Duplicate columns are added before rounding: sums of 14 values below 3 * 1.5.
             np.testing.assert_allclose(a.joints, b.joints, rtol=0, atol=14 * 4.5 * 14 * oracle.EPS)
             np.testing.assert_array_equal(a.animated_maps, b.animated_maps)
     assert edit.regroup(out, timed=0, combinations=0)[0].to_bytes() == out.to_bytes()
@@ -308,7 +308,7 @@ TURNING = {
     # Together in one group control 3, which the coarser LOD has, would be multiplied first.
     "apart": [([1, 1], [3], [4], [[20]]), ([2, 0], [1, 2, 3], [12, 13], FINE)],
     "together": [([3, 1], [1, 2, 3], [4, 12, 13], [COARSE, *FINE])],
-    # The angles of one joint come in at two LODs: what its columns' order hangs on stays with it.
+    # The angles of one joint start at two LODs, so the order of its columns must be kept.
     "mixed": [([3, 1], [1, 2, 3], [12, 4, 13], [FINE[0], COARSE, FINE[1]])],
 }
 
@@ -336,7 +336,7 @@ def face_of_regions(seed, regions=6, joints=12, controls=20):
         values[joint * 9 : joint * 9 + 9, reads[region]] = part
     clean = values.copy()
     for region in range(regions):
-        # At most three of twelve joints: a quarter, which is foreign still.
+        # At most three of twelve joints, a quarter, which still counts as foreign.
         for column in np.setdiff1d(np.arange(60), reads[region])[::2]:
             for joint in rng.choice(np.flatnonzero(owner == region), 3, replace=False):
                 values[joint * 9 + rng.integers(9), column] = rng.uniform(0.0001, 0.0009)
@@ -388,7 +388,7 @@ def test_what_goes_is_below_the_threshold(name, threshold):
         gone = np.count_nonzero(changed)
         assert turns(out, lod) == turns(dna, lod)
     assert report.removed == gone == report.before.nonzero - report.after.nonzero
-    # Controls are at most 1 in what is tried: a joint changes by no more than what it lost.
+    # Controls are at most 1 here, so a joint changes by at most its lost values.
     lost = effects(dna, matrix(dna, 0, wide) - matrix(out, 0, wide)).sum(axis=1).reshape(-1, 9)
     assert report.translation_mm.value <= np.linalg.norm(lost[:, :3], axis=1).max() * 1.001
     assert report.rotation_degrees.value <= lost[:, 3:6].sum(axis=1).max() * 1.001
@@ -462,7 +462,7 @@ def test_regions_by_name_and_index():
     assert_same_matrices(dna, out)
     named = {str(i): [dna.joint_names[j] for j in half] for i, half in enumerate(halves)}
     assert edit.regroup(dna, regions=named, timed=0)[0].to_bytes() == out.to_bytes()
-    # What no region lists comes together by itself.
+    # Joints without a listed region form a group of their own.
     out, report = edit.regroup(dna, regions=[halves[0]], timed=0)
     assert report.regions[0] == halves[0]
     assert sorted(j for region in report.regions[1:] for j in region) == halves[1]
@@ -674,7 +674,8 @@ def test_a_full_scale_face():
 
 
 def _face_of(values):
-    """A face of one joint group: float[joints, controls], what each does to x of each joint."""
+    """A face of one joint group: float[joints, controls], effect of each control on x of each
+    joint."""
     joints, controls = values.shape
     dna = risorius.Dna()
     dna.joint_names = [f"j{i}" for i in range(joints)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Raw controls that hold rotations of joints, found in a file and filled from a clip's head."""
+"""Raw controls of joint rotations, found in a file and filled from the head curves of a clip."""
 
 import numpy as np
 import pytest

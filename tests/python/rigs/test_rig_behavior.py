@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Networks, solvers, setups and quaternions against the reference's values, every case and LOD.
 
-What is known to deviate, and is left out by name below:
-- networks that move joints by Euler angles, read as Euler angles: the reference takes their
+Known deviations, left out by name below: - networks that move joints by Euler angles, read as Euler
+angles: the reference takes their
   rotation and first scale for a quaternion;
 - where joints of networks come in another system of axes, the reference overwrites the network's
   controls with converted values, and loses the sign of their scale;
@@ -10,8 +10,8 @@ What is known to deviate, and is left out by name below:
   by the weights of the last, and those of the others not at all;
 - a twist that shares a rotation with a swing of another axis: the reference turns its joints about
   the axis of the swing;
-- a rotation of 0 0 0 0 is NaN there and identity here;
-- solvers that interpolate between targets that are the same: nothing decides between those.
+- a rotation of 0 0 0 0 is NaN there and identity here; - solvers that interpolate between targets
+that are the same: nothing decides between those.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ ARC = 1e-3
 
 
 class Face:
-    """A rig and what of it may deviate."""
+    """A rig and its possible deviations."""
 
     def __init__(self, name, rotation, simd=None, folder=GOLDEN_SET, **load):
         self.name, self.rotation = name, rotation
@@ -104,7 +104,7 @@ class Face:
             )
 
     def bounds(self, pose, record, lod):
-        """[J, 9]: what sums may lose, and what their controls differ by."""
+        """[J, 9]: bounds from rounding of sums and from differences of controls."""
         wanted = self.expected_controls(record)
         error = np.abs(pose.controls - wanted)
         if self.converted:
@@ -266,8 +266,8 @@ def test_a_face_through_time(name, tag, simd):
 @pytest.mark.parametrize("simd", SIMD)
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
 def test_filtered_loads_are_our_lods(name, tag, lods, simd):
-    """What the reference loaded of some LODs: the joints of those, and those of no LOD. Quaternions
-    aside: their columns are in the order of what was loaded."""
+    """Filtered loads of the reference have the joints of their LODs and joints of no LOD.
+    Quaternions are left out, because the order of their columns depends on the load."""
     face = Face(name, "euler", simd)
     golden = Golden(GOLDEN_SET, name, tag)
     listed = set().union(*(set(face.dna.lod_joint_mapping[lod].tolist()) for lod in lods))
@@ -297,7 +297,7 @@ def test_filtered_loads_are_what_the_reference_loads(name, tag, lods, simd):
 
 
 def reference_joints(name, lods, loaded):
-    """Where its joints are in what we loaded; we keep what a kept joint hangs on, it does not."""
+    """Indices of the reference's joints in our load, which also keeps ancestors of joints."""
     whole = risorius.load(GOLDEN_SET / f"{name}.dna")
     kept = set(range(len(whole.joint_names))) - set(whole.lod_joint_mapping[0].tolist())
     kept |= set().union(*(whole.lod_joint_mapping[lod].tolist() for lod in lods))

@@ -233,7 +233,7 @@ def test_a_control_that_is_not_finite_is_named_when_asked(rig):
     raw[1, jaw] = -np.inf
     with pytest.raises(risorius.DnaError, match=f"{JAW} is minus infinite"):
         rig.evaluate(raw[1], check=True)
-    # What float32 cannot hold is infinite to the evaluator.
+    # Values beyond float32 are infinite to the evaluator.
     with pytest.raises(risorius.DnaError, match="is infinite"), np.errstate(over="ignore"):
         rig.evaluate(np.full(4, 1e39), check=True)
 

@@ -16,8 +16,8 @@ BEYOND = ("rbfSolvers", "twists", "swings", "mlControls", "mlTypes")
 
 
 def is_plain(name, about):
-    """What this oracle evaluates, and does not take long over: few joints are quaternions.
-    test_rig_behavior has the others too."""
+    """Whether this oracle evaluates a file quickly: few joints are quaternions. test_rig_behavior
+    tests all files."""
     if any(about["counts"][part] for part in BEYOND):
         return False
     dna = risorius.load(GOLDEN_SET / f"{name}.dna", layers="joint_behavior_metadata")
@@ -169,7 +169,7 @@ def test_a_face_through_time_has_the_reference_latency(name, simd):
 @pytest.mark.parametrize(("name", "tag", "lods"), FILTERED)
 def test_what_the_reference_loads_filtered_is_our_lod_by_name(name, tag, lods, simd):
     """A filter keeps the joints of its LODs in order: rows are compared joint by joint. Quaternions
-    aside, whose columns are in the order of what was loaded."""
+    are left out, because the order of their columns depends on the load."""
     dna = risorius.load(GOLDEN_SET / f"{name}.dna")
     rig = risorius.Rig(dna, simd=simd)
     golden = Golden(GOLDEN_SET, name, tag)

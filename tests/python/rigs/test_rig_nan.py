@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A control that is no number spoils what it drives, directly or through others, and nothing else.
+"""A NaN control spoils only its own outputs, directly or through other controls.
 
-What it drives is found here by following the file's lists, without arithmetic.
+Its outputs are found by following the lists of the file, without arithmetic.
 """
 
 import numpy as np

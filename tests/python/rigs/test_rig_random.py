@@ -56,7 +56,7 @@ def random_psds(rng, raw, count):
 
 
 def random_face(seed, width):
-    """A face whose groups are `width` rows high and as wide, and taller and wider by one lane."""
+    """A face with joint groups of `width` rows and columns, and with one lane more."""
     rng = np.random.default_rng(seed)
     raw, psds, joints, lods = 12, 9, 60, 3
     dna = risorius.Dna()

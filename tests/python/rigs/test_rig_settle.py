@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Settling against a fixed point: random chains of correctives of correctives, solvers of
-correctives, networks of networks and every other order, each read by what comes before it in a
-frame, against the oracle's frame that is repeated until nothing changes.
+correctives, networks of networks and every other order, each read by an earlier stage of a frame,
+against the oracle's frame that is repeated until nothing changes.
 """
 
 import numpy as np
@@ -13,13 +13,13 @@ from risorius import _native
 SIMD = _native.available_simd().split(", ")
 RAW, JOINTS = 4, 9
 KINDS = ("corrective", "network", "solver")
-# float32 rounds each sum of at most 9 products below 1; nothing here magnifies its inputs, so that
-# losses add up along a chain of at most 12.
+# float32 rounds each sum of at most 9 products below 1. No node magnifies its inputs, so errors add
+# up along a chain of at most 12.
 LOSS = 12 * 10 * float(np.finfo(np.float32).eps)
 
 
 class Chain:
-    """Nodes in the order of their dependency; each reads raw controls and what was before."""
+    """Nodes in the order of their dependency; each reads raw controls and earlier nodes."""
 
     def __init__(self, kinds, rng):
         self.rng, self.kinds = rng, kinds

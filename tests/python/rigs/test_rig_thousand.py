@@ -69,7 +69,7 @@ def random_dna(rng, shape):
 
 
 def expected(dna, raw, lod, precision):
-    """A pose by NumPy in double precision, and what float32 may lose in it: two dicts."""
+    """A pose by NumPy in double precision, and bounds of float32 errors: two dicts."""
     c = np.zeros(len(raw) + dna.psd_count)
     c[: len(raw)] = raw
     oracle.correctives(dna, c, oracle.used_controls(dna, lod), settle=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The self-test of the wheel: it passes here, and sees what is wrong."""
+"""The self-test of the wheel: it passes here and reports planted faults."""
 
 import subprocess
 import sys

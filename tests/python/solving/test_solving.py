@@ -241,7 +241,7 @@ def test_easy_are_the_controls_that_do_most_there(face):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_a_sparse_drag_beyond_reach_ends_about_as_near_as_all_controls(face, mirrored):
-    """As far as 1.3 mm behind; what is on has no opposite on, as without the other controls."""
+    """At most 1.3 mm behind; no active slider has an active opposite."""
     surface, mm = face[1], face[1].mm
     random = np.random.default_rng(3)
     given = {"axes": np.eye(3)[None, ::2], "opposites": [(LEFT, PUFF)]}
@@ -313,7 +313,8 @@ def test_a_sparse_drag_is_continuous_in_its_target(face):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_cheapest_change_is_the_cheapest(seed):
-    """Against the penalised problem by coordinate descent, at the price where they miss alike."""
+    """Compared with coordinate descent on the penalised problem, at the penalty with the same
+    error."""
     rng = np.random.default_rng(seed)
     a, b = rng.normal(size=(3, 12)), rng.normal(size=3) * 2
     low, high = -rng.uniform(0, 1, 12), rng.uniform(0.1, 1, 12)
@@ -513,7 +514,7 @@ def test_a_baked_clip_comes_back(face):
     assert not {"CTRL_expressions.idle", "CTRL_expressions.widen"} & set(solved.clip.names)
     assert told == sorted(told)
     assert told[-1] == pytest.approx(1, abs=0.01)
-    # What is told of the residual is what a mesh of these curves leaves.
+    # The reported residual equals the error of a mesh from these curves.
     left = np.stack([pose(face, row) for row in found]) - vertices
     rms = np.sqrt((left**2).sum(axis=2).mean(axis=1))
     np.testing.assert_allclose(solved.frame_residual, rms, atol=1e-4)

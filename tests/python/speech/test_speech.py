@@ -46,7 +46,7 @@ P = "CTRL_expressions."
 
 @pytest.fixture
 def voice(tmp_path):
-    """Says a text into a file; without espeak-ng the test is an extra that is not run."""
+    """Speak a text into a file; without espeak-ng the test is an extra that does not run."""
     if not espeak_truth.is_installed():
         conftest.require_extra(Path("espeak-ng"), "speech of espeak-ng (apt install espeak-ng)")
     pytest.importorskip("pocketsphinx")

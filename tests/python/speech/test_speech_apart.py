@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech in a process of its own: whatever the program beside it holds, and however it ends."""
+"""Speech in a process of its own: with any state and any end of the main program."""
 
 import os
 import shutil
@@ -29,7 +29,7 @@ def voice(tmp_path):
 
 @pytest.fixture
 def endless(tmp_path):
-    """A sound file that is never read to its end: nobody writes into the pipe."""
+    """A sound file without an end: a pipe without a writer."""
     if not hasattr(os, "mkfifo"):
         pytest.skip("pipes with names")
     os.mkfifo(tmp_path / "endless.wav")
@@ -54,7 +54,7 @@ def test_it_is_the_same_speech(voice, monkeypatch):
     options = {"seed": 3, "rate": 30.0, "library": {"aa": own}}
     wanted = speak(voice, WORDS, **options)
     assert "CTRL_expressions.open_A" in wanted.names
-    # What this process has is of no account: it could not even import the recogniser.
+    # The state of this process does not matter: it cannot even import the recogniser.
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
     with pytest.raises(MissingError):
         speak(voice, WORDS)

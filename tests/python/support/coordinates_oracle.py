@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Coordinate systems by 3x3 and 4x4 matrices in double precision, sharing nothing with native code.
+"""Coordinate systems by 3x3 and 4x4 matrices in double precision, without sharing code with the
+native module.
 
 Row vectors: a point of the source goes to p @ C, a matrix M to inverse(C) @ M @ C.
 """
@@ -42,7 +43,7 @@ class System:
 
 
 def system_of(dna):
-    """The system that a Dna says it is in."""
+    """The coordinate system of a Dna."""
     return System(**{name: getattr(dna, name) for name in System.__dataclass_fields__})
 
 
@@ -63,7 +64,7 @@ def change(source, target):
 
 
 def scale_of_unit(source, target):
-    """What lengths are multiplied by."""
+    """Factor of lengths."""
     centimetres = {"cm": 1.0, "m": 100.0}
     return centimetres[source.translation_unit] / centimetres[target.translation_unit]
 

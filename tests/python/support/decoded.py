@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A Dna in the words of the reference's decode goldens, and both by name.
+"""A Dna in the form of the reference's decoded golden files, and both by name.
 
 A LOD filter of the reference leaves some indices as they were in the whole file (design ruling 1),
-so that filtered files are compared by what the indices name.
+so filtered files are compared by the names behind the indices.
 """
 
 import gzip
@@ -300,7 +300,7 @@ def decoded(dna):
 
 
 def with_defaults(view, dna):
-    """What the reference's getters say of layers that were not loaded or are not in the file."""
+    """Default values of the reference's getters for layers that are missing or not loaded."""
     joints, meshes = len(dna.joint_names), len(dna.mesh_names)
     for attribute in view["jointBehaviorMetadata"].values():
         attribute.extend([0] * (joints - len(attribute)))
@@ -317,7 +317,7 @@ def stride(keys, values):
 
 
 class Names:
-    """What the index spaces of a file hold, in order."""
+    """The names of a file's index spaces, in order."""
 
     def __init__(self, view):
         d = view["definition"]
@@ -443,7 +443,7 @@ def _mesh_by_name(m, own, old):
 
 
 def _operations_by_name(ext, own, old):
-    """Networks by what they hold. The rows per LOD behind a network's number are left out."""
+    """Networks by their content, without the rows for each LOD."""
     mlp = 3
     width = stride(ext["jointsParameterKeys"], ext["jointsParameterValues"])
     types = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Speech whose phoneme times are known: espeak-ng's library tells them while it speaks."""
+"""Speech whose phoneme times are known: espeak-ng's library reports them while it speaks."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-# espeak's own names of the sounds of its American voice, by viseme class; by phonetics, not by
-# what a recogniser makes of them. A diphthong counts as its nucleus.
+# espeak's own names of the sounds of its American voice, by viseme class; by phonetics, independent
+# of a recogniser. A diphthong counts as its nucleus.
 CLASSES = {
     "sil": "_ _: _:: _! _| ?",
     "PP": "p b m m-",
@@ -40,7 +40,7 @@ STOPS = {"p", "b", "t", "d", "k", "g", "tS", "dZ", "t2"}
 
 @dataclass
 class Spoken:
-    """What was said, and when: sound i from times[i] to times[i + 1] seconds."""
+    """Sounds with times: sound i lasts from times[i] to times[i + 1] seconds."""
 
     rate: int
     samples: np.ndarray  # int16

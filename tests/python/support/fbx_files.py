@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Binary FBX as Autodesk's SDK lays it out, for what our reader looks at.
+"""Binary FBX in the layout of Autodesk's SDK, limited to the parts that the reader uses.
 
 Header, records of (end, count, length, name), values by type letter, arrays packed with zlib from
 128 bytes on, an empty record at the end of each list; 32 bit offsets to version 7.4, 64 bit from

@@ -97,7 +97,7 @@ def _apart(a, b):
 
 
 def _nearest(points, wanted):
-    """int64[n]: of each wanted place the point that is there; points of one place move alike."""
+    """int64[n]: the point at each wanted place; points of one place move alike."""
     out = np.empty(len(wanted), np.int64)
     for begin in range(0, len(wanted), 256):
         part = wanted[begin : begin + 256]

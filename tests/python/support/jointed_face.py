@@ -50,7 +50,7 @@ def build() -> risorius.Dna:
 
 
 def _skin_places(positions):
-    """Places on the skin, of both sides, those of the middle last."""
+    """Places on the skin, of both sides, and of the middle last."""
     grid = positions.reshape(face_shapes.DOWN, face_shapes.ACROSS, 3)
     right = grid[2::4, 1:11:2].reshape(-1, 3)[:24]
     middle = grid[2::5, face_shapes.ACROSS // 2][:4]

@@ -89,7 +89,7 @@ def mesh(name, geometry, shapes=None, **more):
 
 
 def with_moving_teeth(shapes):
-    """What moves a mesh of both rows of teeth: the lower one with the jaw."""
+    """Shapes of a mesh with both rows of teeth: the lower row moves with the jaw."""
     whole, faces = joined(*teeth())
     half = len(whole) // 2
     hinge, angle = np.array([0, 0, -2.0]), 0.3

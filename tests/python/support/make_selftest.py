@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Chooses what the self-test of the wheel compares with, from the values of tests/data/golden.
+"""Choose the reference values of the wheel's self-test from tests/data/golden.
 
     python tests/python/support/make_selftest.py
 
-Takes each face of COMES_FROM and the reference's values for some of its cases at every LOD. A
-case that the reference is known to evaluate differently (test_rig_behavior.py says which and why)
-is left out; how many are is printed, so that a mistake of ours would show as a number that grew.
+Takes each face of COMES_FROM and the reference's values for some of its cases at every LOD. A case
+that the reference is known to evaluate differently (test_rig_behavior.py says which and why) is
+left out; how many are is printed, so that a mistake of ours would show as a number that grew.
 """
 
 import hashlib

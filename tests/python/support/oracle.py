@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """A second evaluator in double precision, straight from the format's semantics.
 
-It shares no code with the native one and knows no layout, SIMD or scheduling. Beside each value it
-gives a bound of what float32 arithmetic may lose: a sum of n products rounded in any order errs by
-at most (n + 1) * eps * sum|k x|, and the inputs of the sum are correctives that already err by
-(factors + 1) * eps relative.
+It shares no code with the native one and knows no layout, SIMD or scheduling. For each value it
+also returns a bound of the float32 error: a sum of n products rounded in any order errs by at most
+(n + 1) * eps * sum|k x|, and the inputs of the sum are correctives that already err by (factors +
+1) * eps relative.
 """
 
 import numpy as np

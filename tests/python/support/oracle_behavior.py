@@ -51,7 +51,7 @@ def from_euler(sequence, signs, angles):
 
 
 def to_euler(dna, q):
-    """Angles in the file's unit, from the matrix whose rows are the images of the axes."""
+    """Angles in the file's unit from a rotation matrix whose rows are the rotated axes."""
     m = oracle.quaternion_to_matrix(q)
     i, j, k = ("xyz".index(a) for a in dna.rotation_sequence)
     parity = 1 if j == (i + 1) % 3 else -1

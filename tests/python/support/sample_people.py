@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""People of the sample, read and assembled once for all tests that look at them.
+"""Sample people, read and assembled once for all tests.
 
-Nobody changes what these functions give: the next test has the same objects.
+Tests must not change the returned objects, because later tests use them too.
 """
 
 import functools
@@ -17,7 +17,7 @@ def _data():
 
 
 def data():
-    """The sample's CC0 data; where they cannot be had, the test does not run and says so."""
+    """The sample's CC0 data; without them the test reports NOT RUN."""
     try:
         return _data()
     except source.SourceError as error:

@@ -20,7 +20,7 @@ _ASIDE = np.array([1.0, 0.0])  # where no curve goes a handle lies a frame besid
 
 @dataclass
 class Bezier:
-    """Keys of a curve that bends between them.
+    """Keys of a Bezier curve.
 
     Attributes:
         co: float64[keys, 2], frames and values.
@@ -48,7 +48,8 @@ def straight(frames: Float, values: Float) -> Bezier:
 
 
 class _Basis(NamedTuple):
-    """What cubics over as many samples share: float64[m], samples first, then the middles."""
+    """Values shared by cubics over the same number of samples: float64[m], samples first, then
+    midpoints."""
 
     near: Float
     far: Float
@@ -59,7 +60,7 @@ class _Basis(NamedTuple):
 
 
 class Fitter:
-    """Fits many curves; what curves of the same frames share is computed once."""
+    """Fits many curves; data shared by curves of the same frames are computed once."""
 
     def __init__(self, tolerance: float) -> None:
         """Args: tolerance  how far a curve may be from a sample, absolute, above 0."""
@@ -70,8 +71,8 @@ class Fitter:
     def keys(self, frames: Float, values: Float) -> Bezier:
         """The keys and handles that samples need.
 
-        From each key the curve reaches as far as a cubic stays within the tolerance of all samples
-        on the way, and within four times as much of straight lines in the middle between them.
+        From each key a cubic extends while it stays within the tolerance of all samples, and within
+        four times the tolerance of straight lines at midpoints.
 
         Args:
             frames: float64[n], ascending, n at least 1.
@@ -93,7 +94,7 @@ class Fitter:
         return self.between(frames, values)
 
     def between(self, frames: Float, values: Float) -> Bezier:
-        """As `keys`, with a key at the first and the last sample, also where nothing moves.
+        """As `keys`, with a key at the first and the last sample, also if the values are constant.
 
         Args:
             frames: float64[n], ascending, n at least 2.

@@ -23,18 +23,18 @@ LAST_FRAME = 1_048_574  # Blender's own limit of a scene
 
 
 class ClipError(FaceError):
-    """A clip that cannot become an action, or an action that has nothing for this face."""
+    """A clip cannot become an action, or an action has no control of this face."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """Where a clip's time lies on Blender's frames.
+    """The place of a clip's time on Blender's frames.
 
     Attributes:
         rate: frames per second of the scene, fps / fps_base.
-        start: the scene's frame at which the time `origin` lies.
+        start: the scene's frame of the time `origin`.
         origin: seconds on the clip's clock.
-        whole: whether keys lie on whole frames only, see onto_frames.
+        whole: True: keys on whole frames only, see onto_frames.
     """
 
     rate: float
@@ -51,7 +51,7 @@ class Timing:
         return self.origin + (np.asarray(frames, np.float64) - self.start) / self.rate
 
     def placed(self, frames: Float, values: Float) -> tuple[Float, Float]:
-        """Keys where they lie in the scene: as they are, or on whole frames.
+        """Keys in the scene: at their own times, or on whole frames.
 
         Args:
             frames: float[keys], frames of the scene.
@@ -61,14 +61,15 @@ class Timing:
 
 
 def onto_frames(frames: Float, values: Float) -> tuple[Float, Float]:
-    """Keys on whole frames for samples anywhere.
+    """Convert samples at any time to keys on whole frames.
 
-    Each sample has a key on the frame before it and on the one after it. So there are at most
-    twice as many keys as samples, however long the pauses are, and the straight lines between the
-    keys meet every whole frame where those between the samples do.
+    Each sample has a key on the frame before it and on the one after it. So there are at most twice
+    as many keys as samples, also with long pauses, and the lines between keys equal the lines
+    between samples at every whole frame.
 
     Args:
-        frames: float64[n], ascending; a ten thousandth of a frame beside a whole one is that one.
+        frames: float64[n], ascending; frames within a ten thousandth of a whole frame are rounded
+            to it.
         values: float64[n] or float64[n, width].
 
     Returns:
@@ -92,14 +93,14 @@ class Curve:
 
 @dataclass
 class Keys:
-    """What an action of a clip consists of.
+    """The keys of an action of a clip.
 
     Attributes:
         controls: keys of the sliders, by their property names.
         turns: bone -> frames float64[n] and quaternions float64[n, 4], w first, in the axes of the
             control armature.
-        unknown: names of the clip that this face has no control for.
-        dropped: how many samples were no numbers.
+        unknown: names of the clip without a control of this face.
+        dropped: number of samples that were not finite.
     """
 
     controls: list[Curve] = field(default_factory=list)
@@ -109,13 +110,13 @@ class Keys:
 
 
 def property_names(dna_names: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
-    """The slider of each name that a curve may have: the DNA's own, and Blender's cut one.
+    """Curve name -> slider, for names of the DNA file and Blender's shortened names.
 
-    Where the DNA has a name twice, it means the first.
+    If the DNA file has a name twice, it means the first control.
 
     Args:
-        dna_names: of the controls, as the DNA has them.
-        labels: of the same controls, as Blender has them.
+        dna_names: names of the controls in the DNA file.
+        labels: Blender's names of the same controls.
     """
     found = dict(zip(reversed(dna_names), reversed(labels), strict=True))
     found.update(zip(labels, labels, strict=True))
@@ -136,15 +137,15 @@ def keys_of(
         names: of the clip's curves.
         curves: float32[names, frames].
         times: float64[frames], seconds, ascending.
-        timing: where they lie in the scene.
+        timing: their place in the scene.
         sliders: curve name -> property name, see property_names.
         with_eyes: take curves of eye rotation too.
 
     Returns:
-        Keys. Samples that are no numbers are left out; a curve without any sample has no keys.
+        Keys. Samples that are not finite are left out; a curve without any sample has no keys.
 
     Raises:
-        ClipError: it lies beyond what Blender can play.
+        ClipError: its frames lie outside Blender's range.
     """
     frames = timing.frames(times)
     if frames.size and not np.abs(frames).max() <= LAST_FRAME:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an expression makes of a face's sliders: by strength, by region, flipped, added."""
+"""Blending an expression into a face's sliders: strength, regions, flip, addition."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..base.face_regions import FaceRegions
 
 @dataclass(frozen=True)
 class Way:
-    """How an expression comes onto a face.
+    """Options of blending an expression.
 
     Attributes:
-        strength: 1 sets it, 0 changes nothing; below 0 it is taken away, which additive does.
-        others_to_rest: sliders that it does not move go to rest by the same share.
-        flip: left for right.
-        additive: it is added to what the face does, and nothing goes to rest.
-        regions: only sliders of these; none: of all.
+        strength: 1 sets it, 0 changes nothing; with `additive` a value below 0 subtracts it.
+        others_to_rest: move other sliders to rest by the same share.
+        flip: swap left and right.
+        additive: add it to the current pose, without moving other sliders to rest.
+        regions: move sliders of these regions only; none: all.
     """
 
     strength: float = 1.0
@@ -40,16 +40,16 @@ def mixed(
     regions: FaceRegions,
     held: Collection[str] = (),
 ) -> dict[str, float]:
-    """The new values of the sliders that an expression concerns; limits are not looked at.
+    """The new values of an expression's sliders, without limits.
 
     Args:
-        present: values of the sliders that are there, by name.
-        weights: of the expression, by slider; those that are not there are left out.
+        present: values of the existing sliders by name.
+        weights: weights of the expression by slider; missing sliders are left out.
         rests: values of the sliders at rest.
-        way: how it is mixed in.
+        way: options of blending.
         regions: of the face.
-        held: regions that the expression names as its own: it leaves all others alone, and what
-            it does not move in them goes to rest.
+        held: regions of the expression: other regions stay, and unmoved sliders of these regions go
+            to rest.
     """
     goals = {name: value for name, value in weights.items() if name in present}
     if way.flip:
@@ -71,7 +71,7 @@ def mixed(
 def _flipped(
     goals: Mapping[str, float], present: Collection[str], regions: FaceRegions
 ) -> dict[str, float]:
-    """Left for right; a slider whose partner the face lacks keeps its own."""
+    """Swap left and right; a slider without a partner on this face keeps its value."""
     found = {}
     for name, value in goals.items():
         other = regions.mirrored(name)

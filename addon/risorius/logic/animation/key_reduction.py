@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Baked values to keys: which frames a curve needs so that straight lines stay near all of them."""
+"""Baked values to keys: the frames that a curve needs for straight lines near all values."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def frame_list(start: float, end: float, step: float) -> Times:
 
 
 def continuous(quaternions: Floats) -> Floats:
-    """Quaternions whose signs follow each other, so that lines between them turn the short way.
+    """Quaternions with consistent signs, so that interpolation takes the short way.
 
     Args:
         quaternions: float32[frames, ..., 4].
@@ -48,14 +48,15 @@ def continuous(quaternions: Floats) -> Floats:
 def reduce_keys(frames: ArrayLike, values: ArrayLike, error: float = 0.0) -> Kept:
     """The keys that curves need.
 
-    All curves are walked at once: from the last key of each a cone of slopes is kept that pass all
-    later values within the error; where a value lies outside, the one before becomes a key.
+    All curves are processed together. From the last key of each curve, a cone of slopes is kept
+    that passes all later values within the error. If a value lies outside, the value before it
+    becomes a key.
 
     Args:
         frames: float[N], ascending.
         values: float32[N, curves], finite.
-        error: how far a line between two keys may be from any value, absolute. 0 keeps every key
-            of a curve that moves.
+        error: largest absolute distance of a line between keys from any value. 0 keeps every key of
+            a moving curve.
 
     Returns:
         bool[N, curves]. A curve that stays within the error of its first value has one key.
@@ -93,12 +94,12 @@ def _cones(frames: Times, values: Times, error: float) -> Kept:
 
 
 def rebuilt(frames: Times, values: Floats, keep: Kept) -> Floats:
-    """What straight lines between the keys give at every frame.
+    """Values of straight lines between the keys at every frame.
 
     Args:
         frames: float[N].
         values: float32[N, curves].
-        keep: bool[N, curves]; before the first and after the last key it is held.
+        keep: bool[N, curves]; values are constant before the first and after the last key.
 
     Returns:
         float32[N, curves], computed as Blender does, in float32.

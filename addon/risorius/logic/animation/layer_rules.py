@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers of animation without Blender: what a layer moves, and when it reads its source."""
+"""Layers of animation without Blender: the controls and the time of a layer."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ def masked(
     Args:
         controls: names.
         regions: of the face.
-        chosen: those of them that the layer moves; none means all.
+        chosen: regions that the layer moves; none means all.
         words: names or patterns, separated by spaces or commas: `jawOpen mouth*`, without their
-            prefix and in any case. One that begins with `-` is taken out again. Where all begin
-            with it, they are taken out of everything.
+            prefix and in any case. A word with `-` in front excludes names. If all words have it,
+            they are excluded from all controls.
     """
     wanted = set(chosen)
     patterns = [w.lower() for w in re.split(r"[\s,;]+", words) if w.strip("-")]
@@ -52,15 +52,16 @@ def masked(
 
 @dataclass(frozen=True)
 class Span:
-    """When a layer plays its source, in frames of the scene and of the source.
+    """The time of a layer, in frames of the scene and of the source.
 
     Attributes:
-        start: where the scene shows the source's frame `first`, or `last` of a reversed one.
-        first, last: of the source that are played.
-        scale: how much longer than the source it is; 2 is half as fast.
-        repeat: how often.
-        reverse: from last to first.
-        warp: float64[n] frames of the scene and of the source, instead of all that; or None.
+        start: the scene's frame of the source's frame `first`, or of `last` if reversed.
+        first, last: played frames of the source.
+        scale: factor of the length; 2 is half as fast.
+        repeat: number of repeats.
+        reverse: True: from last to first.
+        warp: float64[n] frames of the scene and of the source, which replace the other settings; or
+            None.
     """
 
     start: float
@@ -77,7 +78,7 @@ class Span:
         return (self.last - self.first) * self.scale
 
     def scene_range(self) -> tuple[float, float]:
-        """Frames of the scene in which it plays."""
+        """The frames of the scene in which the layer plays."""
         if self.warp is not None:
             return float(self.warp[0][0]), float(self.warp[0][-1])
         return self.start, self.start + self.period * self.repeat
@@ -93,13 +94,13 @@ class Span:
 
 
 def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
-    """At which of its own frames a source is sampled so that straight lines between them are it.
+    """The frames of a source to sample, so that straight lines between them reproduce it.
 
-    What the scene shows at its whole frames is always exact. Curves that bend between their keys
-    are sampled four times as often, for subframes.
+    Whole frames of the scene are always exact. Curves with bends between keys get four samples a
+    frame, for subframes.
 
     Args:
-        span: when it plays.
+        span: time of the layer.
         keys: float64[n], frames of all its keys.
         bent: whether a curve has handles, steps or modifiers.
 
@@ -117,7 +118,7 @@ def sample_frames(span: Span, keys: Float, bent: bool) -> Float:
         shown = span.source(np.floor(begin) + np.arange(count) * 0.25)
         grid = np.concatenate([grid, shown[(shown > first) & (shown < last)]])
     every = np.unique(np.concatenate([[first], grid, [last]]))
-    # What is a rounding apart is one: times must ascend.
+    # Merge times that differ by rounding only, because times must ascend.
     return every[np.concatenate([[True], np.diff(every) > _NEAR])]
 
 

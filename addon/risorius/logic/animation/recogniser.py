@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The package that recognises speech: which files of it are installed, and why one was not."""
+"""The package that recognises speech: its known files, and reasons of a failed installation."""
 
 import re
 
 PACKAGE = "pocketsphinx==5.1.1"
-# Of its wheels for the Pythons that Blender has: what was looked at, and nothing else.
+# Hashes of its checked wheels for Blender's Python versions; no other file is accepted.
 HASHES = (
     "bb8fd0fc7fb08dd8f85da21f5121f34ebf4186a5bee91ce85e2d358e69a448bf",  # cp311, Linux x86_64
     "4742dc42c010caf5a2558cac910b0856d85c94e9bb0357ed4ff32f1f0d0837f9",  # cp311, Linux aarch64
@@ -25,15 +25,15 @@ _NO_FILE = re.compile(r"No matching distribution|Could not find a version")
 
 
 def requirements() -> str:
-    """What pip installs: the text of a file of requirements, a hash for each wheel."""
+    """The text of a requirements file for pip, with a hash for each wheel."""
     return " ".join([PACKAGE, *(f"--hash=sha256:{value}" for value in HASHES)]) + "\n"
 
 
 def reason(said: str, running: str) -> str:
-    """Why pip failed. What it says last is often only what followed from it.
+    """The reason why pip failed. Its last line is often only a consequence.
 
     Args:
-        said: all that it wrote.
+        said: the whole output of pip.
         running: this Python and machine, as "Python 3.14 on Linux aarch64".
 
     Returns:

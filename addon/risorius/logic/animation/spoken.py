@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a voice says as a list of sounds, and corrections of it; each gives a new list.
+"""The sounds of a voice as a list, and corrections; each correction returns a new list.
 
-Sounds follow each other without gaps: each lasts until the next one begins. So no correction can
-make a hole or an overlap.
+Sounds follow each other without gaps: each lasts until the next one begins. So corrections make no
+    gaps and no overlaps.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ class SpokenError(FaceError):
 
 @dataclass(frozen=True)
 class Placing:
-    """Where the frames of an action lie in a scene.
+    """The place of an action's frames in a scene.
 
     Attributes:
         offset: the scene's frame of the action's frame 0.
-        scale: frames of the scene that one of the action takes; below 0 where it runs backwards.
+        scale: frames of the scene for one frame of the action; below 0 if it runs backwards.
     """
 
     offset: float = 0.0
@@ -68,7 +68,7 @@ def end_of(sounds: Sequence[Sound], place: int, end: float) -> float:
 
 
 def word_of(sounds: Sequence[Sound], place: int) -> range | None:
-    """The places of the word that a sound belongs to; None for silence and sounds without one.
+    """The places of the sounds of a sound's word; None for silence and sounds without a word.
 
     Args:
         sounds: the list.
@@ -86,7 +86,7 @@ def word_of(sounds: Sequence[Sound], place: int) -> range | None:
 
 
 def changed(old: Sequence[Sound], new: Sequence[Sound], end: float) -> tuple[float, float] | None:
-    """The first and the last frame between which two lists differ in what is heard, or None.
+    """The first and last frame of the difference between two lists, or None.
 
     Args:
         old, new: lists of sounds.
@@ -109,15 +109,15 @@ def changed(old: Sequence[Sound], new: Sequence[Sound], end: float) -> tuple[flo
 def moved(
     sounds: Sequence[Sound], wanted: Mapping[int, float], end: float
 ) -> tuple[list[Sound], list[int]]:
-    """Sounds that begin elsewhere; their order stays, and what is not moved stays where it is.
+    """Move the starts of sounds; order and other sounds stay.
 
     Args:
         sounds: the list.
-        wanted: place -> frame at which it shall begin.
+        wanted: place -> new start frame.
         end: of the whole.
 
     Returns:
-        The new list; the places of those that could not go all the way past a neighbour.
+        The new list, and the places of sounds that stopped at a neighbour.
     """
     begins = [wanted.get(i, s.begin) for i, s in enumerate(sounds)]
     low, high = -float("inf"), end - SHORTEST
@@ -144,7 +144,7 @@ def replaced(sounds: Sequence[Sound], place: int, name: str) -> list[Sound]:
 
 
 def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> list[Sound]:
-    """The list with one more sound; it takes the rest of the one that it begins in.
+    """Insert a sound; it takes the rest of the sound at its start.
 
     Args:
         sounds: the list.
@@ -153,7 +153,7 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
         end: of the whole.
 
     Raises:
-        SpokenError: there is no room for it.
+        SpokenError: the list has no room for it.
     """
     after = next((i for i, s in enumerate(sounds) if s.begin > begin), len(sounds))
     low = sounds[after - 1].begin + SHORTEST if after else -float("inf")
@@ -166,11 +166,11 @@ def inserted(sounds: Sequence[Sound], begin: float, name: str, end: float) -> li
 
 
 def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
-    """The list without some sounds: the one before each takes its time, at the begin the next one.
+    """Remove sounds; the sound before each becomes longer, at the start the next one.
 
     Args:
         sounds: the list.
-        places: of those that go.
+        places: places of the sounds to remove.
 
     Raises:
         SpokenError: no sound would be left.
@@ -192,11 +192,11 @@ def removed(sounds: Sequence[Sound], places: Sequence[int]) -> list[Sound]:
 def respelled(
     sounds: Sequence[Sound], place: int, said: Sequence[tuple[str, Sequence[str]]], end: float
 ) -> list[Sound]:
-    """The list with another word, or several, in the time of the word at a place.
+    """Replace the word at a place by one or more words within its time.
 
     Args:
         sounds: the list.
-        place: of one of the word's sounds; one without a word is replaced alone.
+        place: place of a sound of the word; a sound without a word is replaced alone.
         said: each word with its phonemes.
         end: of the whole.
 
@@ -230,23 +230,23 @@ class Mark(NamedTuple):
 
 
 def label_of(sound: Sound, mouth: str) -> str:
-    """What a marker is called: the word that begins, and the mouth.
+    """The name of a marker: the starting word, and the mouth.
 
     Args:
-        sound: for which it stands.
-        mouth: as M B P.
+        sound: sound of the marker.
+        mouth: name of the mouth, such as M B P.
     """
     return f"{sound.word}: {mouth}" if sound.word else mouth
 
 
 @dataclass(frozen=True)
 class Board:
-    """Markers of a scene while they stand for sounds.
+    """Markers of a scene that represent sounds.
 
     Attributes:
-        placed: those that were put up, one a sound, as they were then.
-        own: the user's own of that moment.
-        there: all that are there now.
+        placed: markers as they were added, one for each sound.
+        own: the user's own markers at that time.
+        there: all current markers.
     """
 
     placed: Sequence[Mark]
@@ -254,17 +254,18 @@ class Board:
     there: Sequence[Mark]
 
     def paired(self, named: Callable[[str], str | None]) -> tuple[dict[int, Mark], list[Mark]]:
-        """Which marker stands for which sound now. Markers carry nothing but frame and name.
+        """The current marker of each sound. Markers store frame and name only.
 
-        One that is as it was stands for its sound; then one of another name at its frame (renamed),
-        one of its name at another frame (moved), and one called as a sound between its neighbours.
+        An unchanged marker belongs to its sound. Next come a marker with another name at its frame
+        (renamed), a marker with its name at another frame (moved), and a marker named like a sound
+        between its neighbours.
 
         Args:
-            named: what somebody wrote -> phoneme, or None.
+            named: text -> phoneme, or None.
 
         Returns:
-            Place in `placed` -> its marker; markers of sounds that come in addition. What is
-            neither is the user's own.
+            Place in `placed` -> its marker, and markers of added sounds. Other markers belong to
+            the user.
         """
         there, found = Counter(self.there), dict[int, Mark]()
         for place, mark in enumerate(self.placed):  # most are as they were, and may be thousands
@@ -307,10 +308,10 @@ def from_marks(
     label: Callable[[str], str],
     named: Callable[[str], str | None],
 ) -> tuple[list[Sound], list[int]]:
-    """The list that markers say: moved, renamed, copied and deleted ones are corrections.
+    """The list from the markers: moved, renamed, copied and deleted markers are corrections.
 
     Args:
-        sounds: the list for which the markers were put up.
+        sounds: the list of the added markers.
         board: the markers.
         placing: where the list lies in the scene.
         end: of the list.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The colours of heat maps: from blue-violet over green to yellow.
 
-Brightness alone tells the order, so that it is the same ramp for those who confuse colours, and on
-grey paper (the ramp is known as viridis).
+Brightness alone gives the order, so colour-blind people and grey prints see the same ramp
+(viridis).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def colours(shares: NDArray[np.float64]) -> NDArray[np.float32]:
     """Colours in sRGB.
 
     Args:
-        shares: float64[n], 0 at the cool end, 1 at the hot one; what lies outside has the end's.
+        shares: float64[n], 0 at the cool end, 1 at the hot end; values outside are clamped.
 
     Returns:
         float32[n, 4], opaque.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names are labels: cut to what Blender holds and numbered where they repeat."""
+"""Names as labels: shortened to Blender's limit and numbered if they repeat."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
     """Shorten a name to at most `limit` bytes of UTF-8, never inside a character.
 
     Args:
-        name: any text; bytes that are not UTF-8 may stand in it as lone surrogates.
+        name: any text; bytes that are not UTF-8 appear as lone surrogates.
         limit: bytes.
 
     Returns:
@@ -25,11 +25,11 @@ def cut(name: str, limit: int = MAX_BYTES) -> str:
 
 
 def listed(labels: Sequence[str], most: int = LISTED) -> str:
-    """Labels for a sentence: the first ones, and how many more there are.
+    """Labels for a sentence: the first ones, and the number of others.
 
     Args:
         labels: at least one.
-        most: so many are named.
+        most: largest number of named labels.
     """
     shown = ", ".join(labels[:most])
     return f"{shown} and {len(labels) - most} more" if len(labels) > most else shown
@@ -69,13 +69,13 @@ def without_lod(mesh_name: str) -> str:
 
 
 def printable(text: str, limit: int = 400) -> str:
-    """A text of a file as it may be shown: one line, and what cannot be printed as `?`.
+    """A text of a file for display: one line, with `?` for unprintable characters.
 
     A zero byte would end the text where Blender shows it.
 
     Args:
         text: as the file has it.
-        limit: letters that are shown at most; a longer text ends in "...".
+        limit: largest number of letters; a longer text ends in "...".
     """
     shown = "".join(c if c.isprintable() else " " if c.isspace() else "?" for c in text)
     return shown if len(shown) <= limit else f"{shown[: limit - 3]}..."

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sentences that can be said in another language later: they remember what they were made of."""
+"""Sentences that can be translated later, because they store template and values."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ class Sentence(str):
     """An English sentence.
 
     Attributes:
-        template: the words with {names} of the values, as in the table of words.
-        values: what stands for them.
+        template: English text with {names} of values, as in the translation table.
+        values: values of the names.
     """
 
     template: str
@@ -22,8 +22,8 @@ def told(template: str, **values: object) -> Sentence:
     """Make a sentence.
 
     Args:
-        template: English words with {names} of the values.
-        values: what stands for them: numbers, names of things, or sentences.
+        template: English text with {names} of values.
+        values: values: numbers, names, or sentences.
     """
     sentence = Sentence(template.format(**values) if values else template)
     sentence.template, sentence.values = template, values

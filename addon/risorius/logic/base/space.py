@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one place of coordinate and unit conversion: DNA file space to Blender space.
+"""All conversion of coordinates and units from DNA file space to Blender space.
 
 Blender: z up, a face looks along -y, its left is +x, right-handed, metres / scene unit scale.
-Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a
-rotation also where `axes` mirrors.
+Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a rotation
+    also if `axes` mirrors.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
 class SpaceError(FaceError):
-    """A file whose axes or units cannot be converted; the text is one sentence for users."""
+    """Axes or units of a file cannot be converted; the text is one sentence for users."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +80,8 @@ class Space:
 
         Args:
             matrices: rotations in Blender's axes.
-            near: float64[n, 3] file angles; of all angles that mean the same rotation those
-                nearest to these are returned.
+            near: float64[n, 3] file angles; of all equal rotations, the angles nearest to these are
+                returned.
         """
         turned = self.axes.T @ matrices @ self.axes
         units = self.radians * self.signs
@@ -189,7 +189,7 @@ def euler_matrices(angles: Float, sequence: Sequence[int]) -> Float:
 
 
 def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float:
-    """Angles whose `euler_matrices` are these; the inverse of that function.
+    """The inverse of `euler_matrices`: the angles of rotation matrices.
 
     Args:
         matrices: float64[n, 3, 3] rotations for column vectors.
@@ -225,7 +225,7 @@ def euler_angles(matrices: Float, sequence: Sequence[int], near: Float) -> Float
 
 
 def world_matrices(rotations: Float, offsets: Float, parents: NDArray[np.uint16]) -> Float:
-    """Chain parent-relative rotations and offsets to matrices of the whole.
+    """Chain parent-relative rotations and offsets to world matrices.
 
     Args:
         rotations: float64[J, 3, 3] parent-relative.

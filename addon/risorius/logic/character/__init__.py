@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of a character is built, how it is grouped and what was edited."""
+"""Plans of a character: its parts, its groups, and the user's edits."""

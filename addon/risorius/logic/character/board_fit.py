@@ -24,11 +24,11 @@ _REST = 1e-10  # of two values that are as good, the one nearer to rest
 
 @dataclass(frozen=True)
 class Loss:
-    """What a conversion loses: the raw controls that differ most.
+    """The loss of a conversion: the raw controls that differ most.
 
     Attributes:
         largest: the largest difference of a raw control at any frame.
-        worst: names with their largest difference, the worst first, none below what is seen.
+        worst: names with their largest difference, the worst first, without invisible differences.
     """
 
     largest: float = 0.0
@@ -40,8 +40,8 @@ def fit(table: BoardTable, raw: ArrayLike, start: ArrayLike) -> Doubles:
 
     Args:
         table: of the face.
-        raw: float[N, R], the raw controls that are wanted.
-        start: float[N, G], where the search begins.
+        raw: float[N, R], wanted raw controls.
+        start: float[N, G], start of the search.
 
     Returns:
         float64[N, G] within the ranges.
@@ -81,8 +81,8 @@ def _descend(table: BoardTable, wanted: Doubles, gui: Doubles) -> None:
 
 
 def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int, int]) -> None:
-    """One of two that lead to the same may have taken what only the other could leave: let the
-    two begin again, each as the first. Args: gui  is changed where that is better."""
+    """Of two GUI controls with a common output, one may have taken a value that the other needs.
+    Restart the search with each of them first. Args: gui changed if the result is better."""
     left = _cost(table, wanted, gui)
     for order in (pair, pair[::-1]):
         tried = gui.copy()
@@ -97,13 +97,13 @@ def _make_room(table: BoardTable, wanted: Doubles, gui: Doubles, pair: tuple[int
 
 
 def _cost(table: BoardTable, wanted: Doubles, gui: Doubles) -> Doubles:
-    """float64[N]: the sum of squares that is left of what the table leads to."""
+    """float64[N]: the remaining sum of squares of the controls in the table."""
     off = (table.raw(gui) - wanted)[:, table.reached]
     return np.asarray((off**2).sum(axis=1), np.float64)
 
 
 def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Doubles:
-    """float64[N]: the best value of one control while the others give what they give."""
+    """float64[N]: the best value of one control with the others fixed."""
     breaks = table.breaks_of(index)
     tried = [np.full(len(wanted), end) for end in breaks]
     for low, high in pairwise(breaks):
@@ -127,13 +127,13 @@ def _best(table: BoardTable, index: int, wanted: Doubles, others: Doubles) -> Do
 def loss(
     labels: list[str], wanted: ArrayLike, given: ArrayLike, which: NDArray[np.bool_], seen: float
 ) -> Loss:
-    """What a conversion loses.
+    """The loss of a conversion.
 
     Args:
         labels: names of the raw controls.
         wanted, given: float[N, R] before and after.
         which: bool[R], the controls that were converted.
-        seen: differences below it are not named.
+        seen: smallest difference to name.
     """
     off = np.abs(np.asarray(wanted, np.float64) - np.asarray(given, np.float64))
     most = np.where(which, off.max(axis=0, initial=0.0), 0.0)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where each slider of the face board lies, and what is drawn around it.
+"""Places of the handles of a face board, and the lines drawn around them.
 
-Lengths are in units of the board: a handle that goes by 1 changes its GUI control by 1. The board
-is seen from the front, x to the viewer's right, y up; the character's left lies on the right. What
-has a name that animators know lies where the face has it; all else lies in rows by region.
+Lengths are in units of the board: moving a handle by 1 changes its GUI control by 1. The board is
+    seen from the front, x to the viewer's right, y up; the character's left is on the right.
+    Handles with known names lie as on a face; all others lie in rows by region.
 """
 
 from __future__ import annotations
@@ -52,15 +52,15 @@ class Axis:
 
 @dataclass(frozen=True)
 class Handle:
-    """A slider of the board.
+    """A handle of the board.
 
     Attributes:
         bone: name of its bone.
         side: "L" or "R", the character's own, or "" for the middle.
         region: of the face.
         stem: its name without prefix and side: eye_blink.
-        x, y: the ways of its bone's own axes; None where it does not go.
-        place: where it rests.
+        x, y: directions of its bone's own axes; None for an unused axis.
+        place: rest place.
     """
 
     bone: str
@@ -76,7 +76,7 @@ class Handle:
         return tuple(axis for axis in (self.x, self.y) if axis is not None)
 
     def box(self) -> tuple[float, float, float, float]:
-        """Left, bottom, right, top of what the handle can reach, from where it rests."""
+        """Left, bottom, right, top of the handle's range, from its rest place."""
         left = bottom = right = top = 0.0
         for axis in self.axes:
             for end in (axis.low, axis.high):
@@ -88,13 +88,13 @@ class Handle:
 
 @dataclass(frozen=True)
 class Board:
-    """All of a face board.
+    """A complete face board.
 
     Attributes:
-        handles: its sliders.
-        lines: what is drawn around them: frames and labels.
-        border: the outline of the board and its title, by which it is taken.
-        width, height: of its outline; its middle is at 0, 0.
+        handles: its handles.
+        lines: frames and labels around them.
+        border: outline of the board with its title, for selecting the board.
+        width, height: of its outline; its centre is at 0, 0.
     """
 
     handles: tuple[Handle, ...]
@@ -104,7 +104,7 @@ class Board:
     height: float
 
 
-# Columns from the outer side of the face inwards, each from the top down; then those of the middle.
+# Columns from the outer side of the face inwards, each from the top down, then the middle columns.
 _Columns = tuple[tuple[str, ...], ...]
 _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
     (
@@ -170,7 +170,7 @@ _FACE: tuple[tuple[str, _Columns, _Columns], ...] = (
         ),
     ),
 )
-# Labels of names that are long, or say nothing without their region.
+# Labels for names that are long or unclear without their region.
 _LABELS = {
     "eyelashes_tweakerin": "Lashes In", "eyelashes_tweakerout": "Lashes Out", "eye": "Look",
     "eye_eyelidu": "Upper Lid", "eye_eyelidd": "Lower Lid", "ear_up": "Ear Up",
@@ -194,7 +194,7 @@ _LIP = re.compile(r"[UD]$")
 
 @dataclass
 class _Cell:
-    """Sliders with one label below them. Of each slider: where its frame's corner lies."""
+    """Handles with one label below them, and the place of the corner of each handle's frame."""
 
     width: float
     height: float
@@ -204,7 +204,7 @@ class _Cell:
 
 @dataclass
 class _Block:
-    """What has one title: cells at places from its upper left corner."""
+    """A titled block: cells at places from its upper left corner."""
 
     title: str
     width: float = 0.0
@@ -213,7 +213,7 @@ class _Block:
 
 
 def is_beside(table: BoardTable, raw_names: Sequence[str], gui: int) -> bool:
-    """Whether a handle goes left and right when a GUI control changes.
+    """Whether the handle of a GUI control moves sideways.
 
     Args:
         table: the GUI controls.
@@ -234,15 +234,16 @@ def is_middle(table: BoardTable, gui: int) -> bool:
 def ways_of(
     table: BoardTable, raw_names: Sequence[str], sideways: Mapping[int, float]
 ) -> list[Direction]:
-    """Where the handle of each GUI control goes when its value grows: as the face goes.
+    """The direction in which the handle of each GUI control moves when its value grows, as on the
+    face.
 
     Args:
         table: the GUI controls.
-        raw_names: of all raw controls; words in them tell most ways.
-        sideways: of some controls how far the face goes to its own left, -1 to 1, as measured.
+        raw_names: of all raw controls; words in them give most directions.
+        sideways: control -> measured motion of the face to its own left, -1 to 1.
 
     Returns:
-        Of each RIGHT, LEFT, UP or DOWN, as the viewer sees them.
+        RIGHT, LEFT, UP or DOWN for each, as seen by the viewer.
     """
     raised: dict[int, str] = {}
     for row in table.rows:
@@ -269,16 +270,16 @@ def handles_of(
     region_of: Callable[[str], str],
     taken: Iterable[str] = (),
 ) -> list[Handle]:
-    """The sliders of a table: tx and ty of one name are one.
+    """The handles of a table: tx and ty of one name share a handle.
 
     Args:
         table: the GUI controls.
-        ways: of each, from ways_of.
+        ways: direction of each, from ways_of.
         region_of: the region of a stem.
-        taken: names that no bone must get.
+        taken: names that bones must not get.
 
     Returns:
-        Handles that lie nowhere yet; none for a control that leads nowhere.
+        Handles without places; controls without outputs get none.
     """
     found: dict[str, Handle] = {}
     for gui, name in enumerate(table.names):
@@ -300,14 +301,14 @@ def handles_of(
 
 
 def _upright(handle: Handle) -> Handle:
-    """Of a handle with both ways the one lies across the other."""
+    """A handle whose two directions are at right angles."""
     if handle.x is None or handle.y is None or handle.y.way in (UP, DOWN):
         return handle
     return replace(handle, y=replace(handle.y, way=UP))
 
 
 def _bone_of(name: str) -> tuple[str, bool]:
-    """The bone of a GUI control, and whether it goes along the bone's x axis."""
+    """The bone of a GUI control, and whether it uses the bone's x axis."""
     stem, _, axis = name.rpartition(".")
     if stem and axis in ("tx", "ty"):
         return stem, axis == "tx"
@@ -334,9 +335,9 @@ def lay_out(handles: Iterable[Handle], titles: Mapping[str, str], is_own: bool =
     """Lay out a board.
 
     Args:
-        handles: its sliders.
-        titles: heading of each region, in the order in which they are shown.
-        is_own: their names are ours, made of the raw controls': all lie in rows by region.
+        handles: its handles.
+        titles: title of each region, in their order.
+        is_own: True: the table was made from raw controls, so all handles lie in rows by region.
     """
     left = list(handles)
     blocks = []
@@ -386,7 +387,8 @@ def _cell(rows: Sequence[Sequence[Handle]], label: list[str]) -> _Cell:
 
 
 def frame_of(handle: Handle) -> tuple[float, float, float, float]:
-    """Left, bottom, right, top of a slider's frame, from where it rests. Args: handle  of it."""
+    """Left, bottom, right, top of a handle's frame, from its rest place. Args: handle the
+    handle."""
     left, bottom, right, top = handle.box()
     half = _TRACK / 2
     return left - half, bottom - half, right + half, top + half
@@ -395,7 +397,7 @@ def frame_of(handle: Handle) -> tuple[float, float, float, float]:
 def _face_block(
     title: str, sides: _Columns, middle: _Columns, left: Sequence[Handle]
 ) -> _Block | None:
-    """A part of the face whose names are known, or None where nothing of it is there."""
+    """A block of known names, or None if the face has none of them."""
     by_name = {(h.side, h.stem.lower()): h for h in left}
 
     def columns(side: str, wanted: _Columns) -> list[list[_Cell]]:
@@ -425,7 +427,7 @@ def _face_block(
 
 
 def _region_block(title: str, handles: Sequence[Handle], width: float) -> _Block | None:
-    """All else of a region, in rows; or None where there is nothing."""
+    """A block of the other handles of a region in rows, or None."""
     if not handles:
         return None
     block = _Block(title)
@@ -477,7 +479,7 @@ def _cells_of(handles: Sequence[Handle]) -> list[_Cell]:
 
 
 def _shelves(blocks: Sequence[_Block], width: float) -> list[list[_Block]]:
-    """Blocks beside each other where there is room."""
+    """Arrange blocks in rows of a given width."""
     rows: list[list[_Block]] = []
     for block in blocks:
         taken = sum(b.width + 2 * _MARGIN for b in rows[-1]) if rows else width
@@ -516,7 +518,7 @@ def _drawn(rows: Sequence[Sequence[_Block]], width: float) -> Board:
 
 
 def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Line]) -> None:
-    """Put a cell's sliders and lines where its upper left corner lies."""
+    """Add a cell's handles and lines at its upper left corner."""
     for handle, across, down in cell.inside:
         place = (x + across, y + down)
         handles.append(replace(handle, place=place))
@@ -528,7 +530,7 @@ def _draw(cell: _Cell, x: float, y: float, handles: list[Handle], lines: list[Li
 
 
 def track_of(handle: Handle) -> list[Line]:
-    """A slider's frame, with marks where it rests. Args: handle  it, with its rest at 0, 0."""
+    """A handle's frame, with marks at rest. Args: handle with its rest at 0, 0."""
     left, bottom, right, top = frame_of(handle)
     frame = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
     if handle.x is not None and handle.y is not None:

@@ -30,7 +30,7 @@ _ADVANCE = 5.6 / 6.0 * _WIDTH  # from a letter to the next, for letters of heigh
 
 
 def width(text: str, height: float) -> float:
-    """How wide a text is.
+    """The width of a text.
 
     Args:
         text: one line.
@@ -43,8 +43,8 @@ def lines(text: str, x: float, y: float, height: float) -> Iterator[list[Point]]
     """The lines of a text.
 
     Args:
-        text: one line; what has no letter here leaves a gap.
-        x, y: where its lower left corner lies.
+        text: one line; unknown letters leave a gap.
+        x, y: place of its lower left corner.
         height: of its letters.
     """
     unit = height / 6.0

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GUI controls as a table: which raw controls each leads to, and how far it goes.
+"""GUI controls as a table: the raw controls and the range of each.
 
-The table is the file's own; a file without GUI controls gets one made of the names of its raw
-controls: one slider each, opposites (Up and Down, Wide and Narrow) on one, both directions of what
-goes up, down, left and right on one handle.
+The table comes from the file. For a file without GUI controls it is made from the names of raw
+controls: one slider for each, opposites (Up and Down, Wide and Narrow) on one slider, and all four
+directions on one handle.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _OPPOSITES = (
 
 @dataclass(frozen=True)
 class Row:
-    """Of a conditional: where from <= value <= to, slope * value + cut is added to an output.
+    """A row of a conditional: if low <= value <= high, slope * value + cut is added to an output.
 
     Attributes:
         gui, raw: indices of the GUI control and of the raw control.
-        low, high: the range of the GUI control in which it holds.
-        slope, cut: of the line.
+        low, high: range of the GUI control.
+        slope, cut: coefficients of the line.
     """
 
     gui: int
@@ -55,10 +55,10 @@ class BoardTable:
 
     Attributes:
         names: of the GUI controls: CTRL_L_eye_blink.ty.
-        rows: in the file's order; of rows with one control and one output the first that holds
+        rows: in the file's order; of rows with the same control and output the first matching one
             counts.
-        raw_count: R, how many raw controls the face has.
-        is_own: made of the raw controls' names, with lines through 0, and not the file's.
+        raw_count: R, number of raw controls of the face.
+        is_own: True: made from names of raw controls, with lines through 0.
     """
 
     names: tuple[str, ...]
@@ -117,14 +117,14 @@ class BoardTable:
         return sorted(ends)
 
     def part(self, gui: int, values: ArrayLike) -> Doubles:
-        """What one GUI control alone adds to its outputs, before they are held in 0..1.
+        """The contribution of one GUI control to its outputs, before clamping to 0..1.
 
         Args:
             gui: its index.
             values: float[N].
 
         Returns:
-            float64[N, outputs of it].
+            float64[N, its outputs].
         """
         v = np.asarray(values, np.float64)
         out = np.zeros((len(v), len(self._pieces[gui])))
@@ -143,13 +143,13 @@ class BoardTable:
             gui: float[N, G].
 
         Returns:
-            float64[N, R] in 0..1; 0 where nothing leads.
+            float64[N, R] in 0..1; 0 for raw controls without a GUI control.
         """
         return np.clip(self.sums(np.asarray(gui, np.float64)), 0.0, 1.0)
 
     @cached_property
     def _straight(self) -> tuple[Whole, Whole, Doubles, Doubles, Doubles]:
-        """Of an own table, whose lines go through 0: inputs, outputs, lowest, highest, slopes."""
+        """Inputs, outputs, lowest, highest and slopes of a made table, whose lines go through 0."""
         rows = self.rows
         numbers = np.array([(row.low, row.high, row.slope) for row in rows], np.float64)
         low, high, slopes = numbers.reshape(-1, 3).T
@@ -178,10 +178,10 @@ def of_file(names: Sequence[str], columns: ArrayLike, raw: int) -> BoardTable:
     Args:
         names: its GUI controls.
         columns: float[6, rows] of its conditionals: inputs, outputs, from, to, slopes, cuts.
-        raw: how many raw controls it has.
+        raw: number of raw controls.
 
     Returns:
-        BoardTable; without the rows that are no numbers, or that can hold for no value.
+        BoardTable; without rows that are not finite or have an empty range.
     """
     rows = []
     for numbers in np.asarray(columns, np.float64).T:
@@ -196,11 +196,11 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
     Args:
         labels: the names of its raw controls.
-        lowest: the least value of each; what goes below 0 is a part of a rotation and is left out.
+        lowest: lowest value of each; controls below 0 are components of a rotation and are left
+            out.
 
     Returns:
-        BoardTable of GUI controls called by what they do: `CTRL_jawOpen.ty`,
-        `CTRL_eyeLookL.tx`.
+        BoardTable of GUI controls with names such as `CTRL_jawOpen.ty`, `CTRL_eyeLookL.tx`.
     """
     short = {label: slider_words.short_name(label) for label in labels}
     index = {short[label]: i for i, label in enumerate(labels) if lowest[i] >= 0.0}
@@ -221,7 +221,8 @@ def of_raw_controls(labels: Sequence[str], lowest: Sequence[float]) -> BoardTabl
 
 
 def _pair(name: str, index: dict[str, int]) -> tuple[str, str, str]:
-    """What raises a slider, what lowers it or "", and its name with its axis."""
+    """The control that raises a slider, the one that lowers it or "", and the slider's name with
+    its axis."""
     for pair in _OPPOSITES:
         for one, other in (pair, pair[::-1]):
             for found in re.finditer(rf"{one}(?=[A-Z_]|$)", name):

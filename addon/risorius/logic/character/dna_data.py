@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is read of a DNA file, as protocols: a risorius.Dna has it, and so may a test's own class.
+"""The used members of a DNA file as protocols, which risorius.Dna and test classes implement.
 
 Arrays are in the file's units and axes.
 """

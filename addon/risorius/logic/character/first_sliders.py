@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which sliders stand first under the heading of their region."""
+"""The sliders that are shown first in their region."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple
 from . import slider_words
 from .slider_rows import Row
 
-# By region at most ten lines, in the order in which the panel shows them; all other sliders of the
-# region stand under More. * is the side; a control that goes left shares its line with the one that
-# goes right. Chosen by how often the expressions of Risorius use them, then by what captures have.
+# At most ten lines for each region, in the order of the panel; other sliders are under More. * is
+# the side. A control to the left shares its line with the one to the right. The choice follows
+# their use in expressions of Risorius, then in captures.
 _FIRST = {
     "brow": (
         "browRaiseIn*",
@@ -90,7 +90,7 @@ _FIRST = {
 
 
 class Parted(NamedTuple):
-    """The lines of a region: those that are shown at once, and those under More."""
+    """The lines of a region: shown at once, and under More."""
 
     first: list[Row]
     more: list[Row]
@@ -114,12 +114,11 @@ def part(rows: Sequence[Row], region: str) -> Parted:
     """The lines of a region, the most used ones first.
 
     Args:
-        rows: all of them, in the order of the file.
-        region: under whose heading they stand.
+        rows: all lines, in the order of the file.
+        region: their region.
 
     Returns:
-        All rows once. Where the table has none of them, as in files with names of their own, all
-        are first.
+        All rows once. If the table knows none of them, all are shown at once.
     """
     ranks = {name: rank for rank, name in enumerate(table().get(region, ()))}
 

@@ -9,7 +9,8 @@ SLACK = 0.1  # of a distance: how far beyond it the viewport waits before it swi
 
 
 def default_distances(count: int, size: float) -> list[float]:
-    """Where each level gives way to the next: doubling from six times the face's size.
+    """Distances at which each level changes to the next: doubling from six times the size of the
+    face.
 
     Args:
         count: of levels.
@@ -31,12 +32,12 @@ def level_at(
 
     Args:
         distance: from the camera.
-        distances: where level n gives way to level n + 1; read in rising order.
-        built: the levels that have meshes, rising, at least one.
+        distances: distances at which level n changes to level n + 1, ascending.
+        built: existing levels, ascending, at least one.
         current: the level shown now, for hysteresis; None for a plain function of the distance.
 
     Returns:
-        One of `built`: the wanted level, else the next coarser one, else the coarsest.
+        One of `built`: the wanted level, or the next coarser one, or the coarsest.
     """
     rising = sorted(distances)
     wanted = sum(distance >= d for d in rising)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a Dna to plain descriptions of what Blender shall hold, before any of it exists."""
+"""Plans of Blender data from a Dna, before any data exist."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class ControlPlan:
 
 @dataclass(frozen=True)
 class Anchors:
-    """Joints that the bones of the control armature turn; empty or None where there are none."""
+    """Joints that the bones of the control armature turn; empty or None if missing."""
 
     neck: tuple[int, ...]
     head: int | None
@@ -135,7 +135,7 @@ class CharacterPlan:
 
 
 def kind_of(mesh_name: str) -> str:
-    """What a mesh is, read from its name: skin unless it says otherwise."""
+    """The kind of a mesh from its name; skin by default."""
     word = mesh_name.lower()
     for kind, parts in _KINDS:
         if any(part in word for part in parts):
@@ -144,7 +144,7 @@ def kind_of(mesh_name: str) -> str:
 
 
 def layer_warnings(layers: Sequence[str]) -> list[str]:
-    """Words for the layers whose behaviour is not evaluated."""
+    """Warnings about layers that are not evaluated."""
     words = [_LAYER_WORDS.get(layer) or told("layer '{name}'", name=layer) for layer in layers]
     return [told("Not evaluated yet: {what}", what=word) for word in dict.fromkeys(words)]
 
@@ -196,8 +196,8 @@ def plan_character(
 
     Args:
         dna: a risorius.Dna with definition, behavior and geometry.
-        fallback_name: used where the file bears no name.
-        lods: levels of detail whose meshes are built.
+        fallback_name: used if the file has no name.
+        lods: levels of detail to build.
         unit_scale: metres per Blender unit.
         rests: raw controls at rest, see plan_controls.
 
@@ -205,8 +205,8 @@ def plan_character(
         The plan; nothing in it refers to `dna`.
 
     Raises:
-        PlanError: there is nothing to build, or indices lead out of their arrays.
-        SpaceError: axes or units that are not known.
+        PlanError: the file has nothing to build, or an index is outside its array.
+        SpaceError: unknown axes or units.
     """
     if not dna.meshes or not dna.mesh_names:
         raise PlanError(told("The file has no geometry layer, so there is no face to build."))
@@ -255,7 +255,7 @@ def _mesh_lods(dna: DnaData) -> list[tuple[int, ...]]:
 
 
 def existing_lods(dna: DnaData, wanted: Sequence[int]) -> tuple[int, ...]:
-    """Those levels of `wanted` that have meshes in a file, else its finest one.
+    """The levels of `wanted` with meshes in a file, or its finest one.
 
     Args:
         dna: the face.
@@ -271,9 +271,9 @@ def plan_controls(
     """The sliders of a file's raw controls, in index order.
 
     Args:
-        raw_names: of all of them.
-        rests: their values at rest, 0 where it ends. A 1 is the w of a quaternion that the file's
-            solvers read: all parts of that quaternion reach from -1 to 1.
+        raw_names: names of all raw controls.
+        rests: their rest values, 0 beyond its end. A 1 marks the w of a quaternion for the file's
+            solvers: all components of that quaternion range from -1 to 1.
     """
     labels = names.unique_labels(raw_names)
     values = [float(r) for r in rests] + [0.0] * (len(raw_names) - len(rests))

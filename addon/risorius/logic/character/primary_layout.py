@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is drawn of the primary board: a face, with the frames of its handles and their labels."""
+"""The drawing of the primary board: a face, with frames and labels of its handles."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .board_table import BoardTable
 
 _TEXT, _LINE = 0.26, 0.36  # heights of letters and of lines
 _GAP, _DISC = 0.12, 0.32  # from a frame to its label, and from where a handle rests
-# So that both fill a view beside each other: a unit of the board, and the way to it.
+# A unit of the board and its distance, chosen so that head and board fill a view side by side.
 _UNIT, _AWAY = 0.122, 0.07  # over the height of the head
 _MARGIN = 0.1  # around all
 _SMOOTH = 6  # pieces between two corners of an outline
@@ -36,7 +36,7 @@ def lay_out(table: BoardTable, handles: Sequence[Handle]) -> Board:
         handles: from primary_table.handles_of.
 
     Returns:
-        Board, whose middle is at 0, 0.
+        Board with its centre at 0, 0.
     """
     lines = [*_outlines()]
     parts = primary_table.sides_of(table)
@@ -49,14 +49,14 @@ def lay_out(table: BoardTable, handles: Sequence[Handle]) -> Board:
 
 
 def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], float]:
-    """Where the board goes: close to the head, as far in front as the face.
+    """The place of the board: close to the head, in the plane of the face.
 
     Args:
-        low, high: float[3] of what the head takes; the face looks along -y.
+        low, high: float[3] bounding box of the head; the face looks along -y.
         width: of the board.
 
     Returns:
-        Its middle, and the length of one of its units.
+        Its centre, and the length of one of its units.
     """
     low, high = np.asarray(low, np.float64), np.asarray(high, np.float64)
     tall = float(high[2] - low[2]) or 1.0
@@ -65,7 +65,7 @@ def beside(low: ArrayLike, high: ArrayLike, width: float) -> tuple[list[float], 
 
 
 def _words(text: str, side: str) -> str:
-    """Both ends of a label as they lie on a side."""
+    """Both ends of a label in their order on a side."""
     ends = text.split(" | ")
     return "   ".join(reversed(ends) if side == "R" else ends)
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The primary board: some 30 handles that lie as a face does, each for several controls.
+"""The primary board: some 30 handles arranged like a face, each for several controls.
 
-A handle's place along its own axes is a value from -1 to 1; each half of an axis leads to controls
-with weights. So it is a table of GUI controls like that of a file, made of the names of the raw
-controls. A control that a face lacks is left out, and so is a half, an axis or a handle that would
-lead to none. What no handle leads to stays with the sliders.
+A handle's location on its own axes is a value from -1 to 1, and each half of an axis sets controls
+with weights. So it is a table of GUI controls like that of a file, made from names of raw controls.
+Missing controls are left out, and so are halves, axes and handles without controls. Controls
+without a handle keep their sliders.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ _CLEAR = 0.05  # a movement to one side that is less tells nothing
 
 @dataclass(frozen=True)
 class Part:
-    """A handle of the face, or both of a pair.
+    """A handle of the face, or a pair of handles.
 
     Attributes:
         stem: its name without the side.
         label: its words on the board, in short lines; `inwards | outwards` names both ends.
         region: of the face.
-        place: where it rests on the board; of a pair the one on the character's left.
-        paired: each side has its own; else it leads to both sides of a control.
-        up, down, out, inward: what the halves of its axes lead to; where it is one for both sides
-            `out` is the character's left.
-        label_at: the side of it that the label stands on; of a pair that of the character's left.
+        place: its rest place on the board; for a pair the one on the character's left.
+        paired: True: one handle for each side; False: one handle for both sides.
+        up, down, out, inward: controls of the halves of its axes; for a single handle `out` is the
+            character's left.
+        label_at: the side of the label; for a pair that of the left handle.
     """
 
     stem: str
@@ -53,7 +53,8 @@ PARTS = (
     Part("brow_inner", ("Brow", "Inner"), "brow", (1.75, 5.2), True,
          up={"browRaiseIn": 1.0}, down={"browDown": 1.0}, inward={"browLateral": 1.0},
          label_at=RIGHT),
-    # The face has one control that lowers a brow; here it goes beside the inner end raised.
+    # The face has one control that lowers a brow; this handle combines it with the raised inner
+    # end.
     Part("brow_outer", ("Brow Outer",), "brow", (3.35, 5.2), True,
          up={"browRaiseOuter": 1.0}, down={"browDown": 1.0}),
     Part("gaze", ("Gaze",), "eye", (0.0, 2.75), False,
@@ -113,10 +114,10 @@ class _Way:
 
 
 def bone_of(part: Part, side: str) -> str:
-    """The bone of a handle. Args: part  which it is; side  "L" or "R", "" for one of no side.
+    """The bone of a handle. Args: part the handle; side "L" or "R", "" for none.
 
-    The side stands where Blender sees none: it mirrors about the armature's middle, which is not
-    the board's.
+    The side is in the middle of the name, where Blender does not find it, because Blender mirrors
+    about the centre of the armature and not of the board.
     """
     return f"face_{side}_{part.stem}" if side else f"face_{part.stem}"
 
@@ -128,7 +129,7 @@ def table_of(labels: Sequence[str]) -> BoardTable:
         labels: the names of its raw controls.
 
     Returns:
-        BoardTable, whose GUI controls are called by the bones: `face_L_mouth_corner.ty`.
+        BoardTable with GUI controls named after the bones: `face_L_mouth_corner.ty`.
     """
     index = {slider_words.short_name(label): i for i, label in enumerate(labels)}
     found: list[str] = []
@@ -162,12 +163,12 @@ def _raws(led: Led, side: str, index: Mapping[str, int]) -> dict[int, float]:
 def handles_of(
     table: BoardTable, sideways: Mapping[int, float], taken: Iterable[str] = ()
 ) -> list[Handle]:
-    """The handles of a table, each where it lies on the board.
+    """The handles of a table with their places on the board.
 
     Args:
         table: from table_of.
-        sideways: of some GUI controls how far the face goes to its own left, as measured.
-        taken: names that no bone must get.
+        sideways: GUI control -> measured motion of the face to its own left.
+        taken: names that bones must not get.
     """
     index = {name: gui for gui, name in enumerate(table.names)}
     found = []

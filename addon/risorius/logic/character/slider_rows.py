@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sliders in rows: what stands beside what, and what is called left."""
+"""Sliders in rows, with left and right."""
 
 from __future__ import annotations
 
@@ -15,12 +15,11 @@ _LEFT = re.compile(r"L(?=$|Ph\d$)|Left")
 
 @dataclass(frozen=True)
 class Row:
-    """What stands in one line of the panel.
+    """One line of the panel.
 
     Attributes:
-        title: the words before the sliders.
-        sliders: controls from the left to the right; two are the two sides of one control or the
-            two directions of a whole one.
+        title: text before the sliders.
+        sliders: controls from left to right; two are the sides of a control, or its two directions.
     """
 
     title: str
@@ -37,14 +36,13 @@ def rows_of(names: Sequence[str], region: str, regions: FaceRegions, as_seen: bo
 
     Args:
         names: controls of the region, in their order.
-        region: under whose heading they stand.
-        regions: of the face, which know partners.
-        as_seen: left is where one sees it when the face looks at oneself; else it is the
-            character's own left. Both are named and placed so.
+        region: their region.
+        regions: regions of the face, which know partners.
+        as_seen: True: left is as seen by the viewer; False: the character's own left. Names and
+            places follow it.
 
     Returns:
-        Each control once: the two sides of a control in one row, and so a control that goes
-        left and one that goes right.
+        Each control once: the two sides of a control, or its left and right direction, share a row.
     """
     there, done, rows = set(names), set(), []
     for name in names:
@@ -75,11 +73,11 @@ def _row(name: str, other: str, region: str, as_seen: bool, twins: bool) -> Row:
 
 
 def is_left(name: str, by_side: bool = True) -> bool:
-    """Whether a control is of the character's left side, or else goes to its left.
+    """Whether a control belongs to the character's left side or moves to its left.
 
     Args:
-        name: of a control that has a partner.
-        by_side: look at the side, which stands at the end; eyeLookLeftR is no left one then.
+        name: name of a control with a partner.
+        by_side: True: use the side at the end of the name, so that eyeLookLeftR is not left.
     """
     last = slider_words.short_name(name)
     found = _LEFT.findall(last)
@@ -89,16 +87,15 @@ def is_left(name: str, by_side: bool = True) -> bool:
 def across_from(
     values: Mapping[str, float], regions: FaceRegions, from_left: bool
 ) -> dict[str, float]:
-    """What the other side is to have so that both are alike.
+    """The values of the other side that make both sides alike.
 
     Args:
-        values: of controls that are there, by name.
+        values: values of existing controls by name.
         regions: of the face.
-        from_left: the character's left side is the one that is copied.
+        from_left: True: copy the character's left side.
 
     Returns:
-        The new values of the other side; eyes go on looking the same way. A control without a
-        side is not among them.
+        The new values of the other side; the gaze stays. Controls without a side are left out.
     """
     found = {}
     for name, value in values.items():
@@ -109,20 +106,20 @@ def across_from(
 
 
 def mirrored(values: Mapping[str, float], regions: FaceRegions) -> dict[str, float]:
-    """Values with left for right.
+    """Values with left and right swapped.
 
     Args:
         values: of controls, by name.
         regions: of the face.
 
     Returns:
-        The same controls; one whose partner is not there keeps its value.
+        The same controls; a control without an existing partner keeps its value.
     """
     return {name: values.get(regions.mirrored(name), value) for name, value in values.items()}
 
 
 def flipped(values: Mapping[str, float], regions: FaceRegions) -> dict[str, float]:
-    """A copied pose with left for right, for a face that may have other controls.
+    """A copied pose with left and right swapped, for a face that may have other controls.
 
     Args:
         values: of controls, by name.
@@ -132,7 +129,7 @@ def flipped(values: Mapping[str, float], regions: FaceRegions) -> dict[str, floa
 
 
 def pairs(names: Collection[str], regions: FaceRegions) -> list[tuple[str, str]]:
-    """The controls of the character's left side with those of its right.
+    """Pairs of controls of the character's left and right side.
 
     Args:
         names: of all controls.

@@ -10,7 +10,7 @@ from ..base.face_regions import FaceRegions
 
 _OTHER = {"Left": "Right", "Right": "Left"}
 _SIDE = re.compile(r"[LR](?=$|Ph\d$)")
-# Upper and lower lip or teeth, the inner and outer part, a phase: as they end the names.
+# Endings of names: upper and lower lip or teeth, inner and outer part, phase.
 _WORDS = {
     **{"U": " Upper ", "D": " Lower ", "C": " Centre ", "IN": " Inner ", "OUT": " Outer "},
     **{"Ph": "Phase ", "Fwd": "Forward"},
@@ -32,13 +32,13 @@ def title(control: str) -> str:
 
 
 def title_in_region(control: str, region: str, sided: bool = True, swapped: bool = False) -> str:
-    """Words for a slider under its region's heading: no `Mouth` before `Corner Pull L`.
+    """The label of a slider in its region, without the name of the region: `Corner Pull L`.
 
     Args:
         control: the control's name.
-        region: the one that it is shown under.
-        sided: keep a last L or R; without, both sides share the words.
-        swapped: say left for right: the words are for one who looks at the face.
+        region: its region.
+        sided: keep a final L or R; False: both sides share the label.
+        swapped: swap left and right, for the viewer.
     """
     text, side = _without_side(title(control))
     if swapped:
@@ -49,11 +49,11 @@ def title_in_region(control: str, region: str, sided: bool = True, swapped: bool
 
 
 def title_of_directions(control: str, region: str) -> str:
-    """Words that a control that goes left shares with the one that goes right.
+    """The common label of a control to the left and its partner to the right.
 
     Args:
         control: one of them.
-        region: the one that they are shown under.
+        region: their region.
     """
     words = ["Sideways" if word in _OTHER else word for word in title(control).split()]
     return _below(" ".join(words), region)
@@ -68,7 +68,7 @@ def _without_side(text: str) -> tuple[str, str]:
 
 
 def _below(text: str, region: str) -> str:
-    """A title without its region's name, and what is short in it in words."""
+    """A title without its region's name, and with abbreviations in words."""
     first, _, rest = text.partition(" ")
     text = rest if rest and first.lower() == region else text
     return " ".join(_SHORT.sub(lambda part: _WORDS[part[0]], text).split())
@@ -82,7 +82,7 @@ def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, l
         regions: of the face.
 
     Returns:
-        Region -> indices in their order, regions in the order in which they are shown, none empty.
+        Region -> indices in their order, regions in their order, none empty.
     """
     groups: dict[str, list[int]] = {region: [] for region in regions.titles}
     for index, control in enumerate(controls):
@@ -91,13 +91,13 @@ def group_controls(controls: Sequence[str], regions: FaceRegions) -> dict[str, l
 
 
 def matches(control: str, search: str, known: str = "") -> bool:
-    """Whether every word of the search stands in what a control is called.
+    """Whether every word of the search occurs in the names of a control.
 
     Args:
-        control: its name; a word may stand anywhere in it, or in its title.
-        search: what was typed.
-        known: more words for it, as animators have them, which begin with what was typed: an ear
-            is no fear.
+        control: its name; a word may occur anywhere in it or in its title.
+        search: typed text.
+        known: further words of animators; these must begin with the typed text, so that "ear" does
+            not find "fear".
     """
     text, more = f"{control} {title(control)}".casefold(), known.casefold().split()
     return all(

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where camera, lights and backdrop of a portrait stand around a head.
+"""Places of camera, lights and backdrop of a portrait around a head.
 
-All places are in the head's own axes, as Blender has them: the face looks along -y, z is up, the
-origin lies between the eyes. Numbers are a photographer's, in metres for a grown head, and grow
-and shrink with the distance between the eyes.
+All places are in the head's own axes: the face looks along -y, z is up, the origin is between the
+eyes. Numbers follow portrait photography, in metres for an adult head, and scale with the distance
+between the eyes.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Lamp:
     """One softbox.
 
     Attributes:
-        name: what a photographer calls it.
-        place: of its middle; it shines at the origin.
+        name: its name in photography.
+        place: of its centre; it points at the origin.
         size: width and height.
         watts: radiant power.
         colour: linear, in [0, 1].
@@ -55,13 +55,13 @@ class Studio:
 
     Attributes:
         camera: its place.
-        target: the middle of the picture.
+        target: centre of the picture.
         lens: mm, on a sensor SENSOR high.
         lamps: key, fill and rim.
-        wall: middle of the backdrop, behind the head as the camera sees it.
-        wall_turn: radians about z by which it faces the camera.
+        wall: centre of the backdrop, behind the head as seen from the camera.
+        wall_turn: rotation about z in radians towards the camera.
         wall_size: its width and height.
-        glow: radius of the lighter middle of the backdrop.
+        glow: radius of the lighter centre of the backdrop.
     """
 
     camera: Triple
@@ -75,8 +75,8 @@ class Studio:
 
 
 _Row = tuple[str, float, float, float, tuple[float, float], float, Triple]
-# Degrees aside (to the right of one who looks at the face) and up, metres away, width and height,
-# light at the face as a share of the key's, colour. Fill: two stops under the key.
+# Degrees to the viewer's right and up, distance in metres, width and height, light at the face as a
+# share of the key light, colour. Fill: two stops under the key.
 _LAMPS: tuple[_Row, ...] = (
     ("Key", -45.0, 30.0, 1.3, (0.6, 0.6), 1.0, (1.0, 0.925, 0.84)),
     ("Fill", 42.0, 4.0, 2.0, (1.5, 1.5), 0.25, (0.86, 0.93, 1.0)),
@@ -120,10 +120,10 @@ def plan(apart: float, low: Sequence[float], high: Sequence[float]) -> Studio:
 
 
 def _frame(unit: float, low: float, high: float) -> tuple[float, float]:
-    """Height of the picture, and its middle's height over the eyes.
+    """Height of the picture, and the height of its centre above the eyes.
 
-    The eyes lie on the upper third, unless hair is higher than that leaves room for. A face that
-    ends at the neck fills the picture to its lower edge; one that ends at the chin is in it whole.
+    The eyes lie on the upper third, unless hair needs more room. A face with a neck fills the
+    picture to its lower edge; a face that ends at the chin is shown whole.
     """
     below = min(_HEIGHT * (1.0 - _THIRD) * unit, max(-low - _EDGE * unit, _CHIN * unit))
     if -low <= _NECK * unit:

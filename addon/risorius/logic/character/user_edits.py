@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a user changed, told from what an import gave; and how it is carried elsewhere.
+"""The user's edits, relative to the import, and their transfer.
 
-Nothing here guesses: a number counts as edited where it differs from what importing the original
-file gives, bit for bit. Only where Blender itself moved a shape key along with the basis is the
-rounding of those two float32 additions allowed for.
+A number counts as edited if it differs bit for bit from the import of the original file. Only where
+Blender moved a shape key with the basis, the rounding of two float32 additions is allowed.
 """
 
 from __future__ import annotations
@@ -43,16 +42,17 @@ def shaped(basis: Float32, indices: NDArray[np.int64], deltas: Float32) -> Float
 def key_edits(
     basis: Float32, points: Float32, imported_basis: Float32, wanted: Float32
 ) -> tuple[Mask, Float]:
-    """What was edited in a shape key.
+    """The edits of a shape key.
 
     Args:
-        basis: float32[V, 3] the basis as it is now.
-        points: float32[V, 3] the key as it is now.
-        imported_basis: float32[V, 3] the basis that the import gave.
+        basis: float32[V, 3] the current basis.
+        points: float32[V, 3] the current key.
+        imported_basis: float32[V, 3] the imported basis.
         wanted: float32[V, 3] `shaped(basis, ...)` of the key's channel.
 
     Returns:
-        bool[V], and float64[V, 3]: how far the key's delta is from the channel's; 0 elsewhere.
+        bool[V], and float64[V, 3]: difference between the key's delta and the channel's; 0
+        elsewhere.
     """
     differs = points != wanted
     if not differs.any():
@@ -71,7 +71,7 @@ def key_edits(
 
 
 def index_map(old: Sequence[str], new: Sequence[str]) -> list[int]:
-    """For each old label its place among the new ones, -1 where it is gone."""
+    """Index of each old label among the new ones, -1 if it is missing."""
     where = {label: i for i, label in enumerate(new)}
     return [where.get(label, -1) for label in old]
 
@@ -107,7 +107,7 @@ def sizes(moves: Float, unit: float) -> tuple[int, float, float]:
         unit: metres per Blender unit.
 
     Returns:
-        n, largest and mean in millimetres; 0 where there are none.
+        n, largest and mean in millimetres; 0 without moves.
     """
     if not len(moves):
         return 0, 0.0, 0.0
@@ -120,7 +120,7 @@ def replace_totals(
     vertices: NDArray[np.int64],
     totals: Float32,
 ) -> list[tuple[NDArray[np.uint32], Float32]]:
-    """Sparse targets of one channel whose sum at some vertices is what is asked for.
+    """Change the sparse targets of a channel to given sums at some vertices.
 
     Args:
         targets: (vertex indices, deltas float32[K, 3]) of each target, at least one.
@@ -128,7 +128,7 @@ def replace_totals(
         totals: float32[n, 3] the new sums there.
 
     Returns:
-        The targets, every other delta as it was; vertices that none has join the first.
+        The targets with all other deltas unchanged; new vertices are added to the first one.
     """
     row_of = {int(v): row for row, v in enumerate(vertices)}
     placed: set[int] = set()
@@ -137,7 +137,7 @@ def replace_totals(
         written = deltas.copy()
         for place, vertex in enumerate(indices.tolist()):
             if vertex in row_of:
-                # What stands more than once is written once: the sum is what counts.
+                # Write a repeated vertex once and 0 otherwise, because the sum counts.
                 written[place] = 0.0 if vertex in placed else totals[row_of[vertex]]
                 placed.add(vertex)
         result.append((indices, written))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a 3D view has to be to show something whole."""
+"""The place of a 3D view that shows something whole."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _NEAR_ENOUGH = 1.8  # a view that is so many times nearer or farther than wanted
 
 
 def distance(radius: float, lens: float, size: Sequence[float], perspective: bool) -> float:
-    """How far a view has to be from the middle of a ball to show it whole.
+    """The distance of a view from the centre of a ball that shows it whole.
 
     Args:
         radius: of the ball, in Blender units.
         lens: of the view, in mm.
         size: width and height of its region, in pixels.
-        perspective: whether it is one.
+        perspective: whether it is a perspective view.
     """
     longer, shorter = max(*size, 1.0), max(min(size), 1.0)
     slope = _HALF / lens * shorter / longer  # half of what the shorter side shows
@@ -36,17 +36,17 @@ def distance(radius: float, lens: float, size: Sequence[float], perspective: boo
 def on_screen(
     points: ArrayLike, far: float, lens: float, size: Sequence[float], perspective: bool
 ) -> NDArray[np.float64]:
-    """Where points are drawn, in pixels from the middle of a view.
+    """Places of points in pixels from the centre of a view.
 
     Args:
-        points: float[N, 3] from the point that the view turns about: to its right, up, towards it.
+        points: float[N, 3] relative to the view's pivot: right, up, towards the view.
         far: the view's distance from that point.
         lens: of the view, in mm.
         size: width and height of its region, in pixels.
-        perspective: whether it is one.
+        perspective: whether it is a perspective view.
 
     Returns:
-        float64[N, 2]; no number for what lies behind the view.
+        float64[N, 2]; NaN for points behind the view.
     """
     places = np.asarray(points, np.float64)
     away = far - places[:, 2] if perspective else np.full(len(places), far)
@@ -57,17 +57,17 @@ def on_screen(
 def fit(
     points: ArrayLike, lens: float, size: Sequence[float], free: Box, perspective: bool
 ) -> tuple[float, float, float]:
-    """Where a view has to be to show points in the free part of its region, as large as it goes.
+    """The place of a view that shows points as large as possible in the free part of its region.
 
     Args:
         points: float[N, 3] in the view's axes: to its right, up, towards it.
         lens: of the view, in mm.
         size: width and height of its region, in pixels.
-        free: the part of the region that nothing covers, in pixels from its lower left corner.
-        perspective: whether it is one.
+        free: the uncovered part of the region, in pixels from its lower left corner.
+        perspective: whether it is a perspective view.
 
     Returns:
-        How far to its right and up the point lies that it turns about, and the distance from that.
+        Pivot to the right and up, and the distance from it.
     """
     places = np.asarray(points, np.float64)
     room = np.array([free[2] - free[0], free[3] - free[1]]) * _FILLED
@@ -89,7 +89,7 @@ def fit(
 def _middle(
     points: NDArray[np.float64], far: float, lens: float, size: Sequence[float], perspective: bool
 ) -> NDArray[np.float64]:
-    """float64[2]: the middle of what on_screen gives."""
+    """float64[2]: the centre of the result of on_screen."""
     seen = on_screen(points, far, lens, size, perspective)
     return (seen.min(axis=0) + seen.max(axis=0)) / 2
 
@@ -97,12 +97,12 @@ def _middle(
 def is_well_in_view(
     middle: Sequence[float], radius: float, wanted: float, held: Sequence[float], far: float
 ) -> bool:
-    """Whether a view shows a ball well enough to be left as it is.
+    """Whether a view already shows a ball well.
 
     Args:
         middle, radius: of the ball.
         wanted: distance that shows it whole.
-        held: the point that the view turns about.
+        held: pivot of the view.
         far: its distance from that point.
     """
     near = wanted / _NEAR_ENOUGH < far < wanted * _NEAR_ENOUGH

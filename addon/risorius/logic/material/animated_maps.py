@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an animated map does to the skin, read from its name."""
+"""The effect of an animated map on the skin, from its name."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class MapUse:
         label: its name.
         color, normal: whether it changes the colour, the normals, or both.
         number: 1 to 3 for a wrinkle set, 0 for none.
-        region: as in `head_wm1_blink_l`, lower case; empty where the name has none.
+        region: as in `head_wm1_blink_l`, lower case; empty if the name has none.
         area: one of AREAS, or all.
         side: L, R or empty.
     """
@@ -64,7 +64,7 @@ class MapUse:
 
 
 def use_of(index: int, label: str) -> MapUse:
-    """What a map does: `head_cm1_color.head_wm1_blink_L` tints the left eye with set 1.
+    """The effect of a map: `head_cm1_color.head_wm1_blink_L` tints the left eye with set 1.
 
     Args:
         index: of the map in the DNA.
@@ -94,7 +94,7 @@ def use_of(index: int, label: str) -> MapUse:
 
 
 def area_of(name: str) -> str:
-    """The area of a face that a region's name speaks of; `all` where it speaks of none."""
+    """The area of a face in a region's name; `all` if it names none."""
     word = name.lower()
     for area, starts in _AREA_WORDS:
         if any(s in word for s in starts):
@@ -103,5 +103,5 @@ def area_of(name: str) -> str:
 
 
 def uses_of(labels: Sequence[str]) -> list[MapUse]:
-    """What each map of a file does, in index order."""
+    """The effect of each map of a file, in index order."""
     return [use_of(i, label) for i, label in enumerate(labels)]

@@ -14,13 +14,13 @@ _TIFF_TAGS = 4000
 
 
 def size_of(read: Read) -> tuple[int, int, int] | None:
-    """Width, height and the bytes that Blender takes for a pixel.
+    """Width, height, and Blender's bytes for a pixel.
 
     Args:
-        read: gives the bytes of the file from an offset on, as many as are asked for or there.
+        read: returns up to a given number of bytes of the file from an offset.
 
     Returns:
-        None where it is no PNG, JPEG, BMP, WebP, TIFF, OpenEXR or Targa, or its head is damaged.
+        None if it is no PNG, JPEG, BMP, WebP, TIFF, OpenEXR or Targa, or its header is damaged.
     """
     head = read(0, 32)
     try:

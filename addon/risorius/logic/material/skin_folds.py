@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a face folds, from its shape: soft areas and coordinates for materials without maps."""
+"""Folds of a face from its form: soft areas and coordinates for materials without maps."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ _NEVER_BEHIND = {"neck"}  # areas that reach farther back than the eyes
 
 @dataclass(frozen=True)
 class FaceFrame:
-    """Where a face is, in Blender units: it looks along -y, z is up, its left is +x.
+    """Place of a face in Blender units: it looks along -y, z is up, its left is +x.
 
     Attributes:
         origin: float64[3] between the eyes' centres.
         unit: distance of the eyes' centres.
-        drop: from the eyes down to the mouth.
+        drop: distance from the eyes down to the mouth.
     """
 
     origin: NDArray[np.float64]
@@ -51,7 +51,7 @@ def find_frame(eyes: Sequence[Float], head: Points, mouth: Points | None) -> Fac
     """The frame of a face.
 
     Args:
-        eyes: centres of one eye or both; none where they are not known.
+        eyes: centres of one eye or both; empty if unknown.
         head: float[V, 3] vertices of the head.
         mouth: a point inside the mouth, or None.
     """
@@ -86,7 +86,7 @@ def face_coordinates(points: Points, frame: FaceFrame) -> NDArray[np.float64]:
 
 
 def area_masks(points: Points, frame: FaceFrame) -> dict[str, Float32]:
-    """How much each vertex belongs to each area.
+    """Weight of each vertex in each area.
 
     Args:
         points: float[V, 3] in Blender units.

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..base import names
 
 EXTENSIONS = (".png", ".tga", ".exr", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".webp")
-# Beside the DNA file; `{stem}` is the file's name without its ending.
+# Folders beside the DNA file; `{stem}` is the name of the file without its ending.
 FOLDERS = (
     "{stem}_textures",
     "Maps",
@@ -64,14 +64,14 @@ _ROLE_WORDS = {
     "alpha": "alpha",
     "opacity": "alpha",
 }
-# Words that say nothing on what a texture is for.
+# Words in names of textures without a meaning for their role.
 _FILLERS = {"t", "tx", "map", "maps", "main", "base", "animated", "baked", "vt", "inst", "lod0"}
 _SIZE = re.compile(r"^(\d+|\d+k|u?1001)$")
 _SET = re.compile(r"^([cw]m)([1-9])$")
 _MASK = re.compile(r"^(?:t_)?(head_wm\d+_[a-z]+(?:_[a-z]{1,2})?)(?:_msk|_mask)?$")
 _PACKED = re.compile(r"^(?:t_)?head_(wm\d+)_msk_(\d\d)$")
 
-# The regions that the channels red, green, blue, alpha of the packed masks hold.
+# The regions in the channels red, green, blue, alpha of the packed masks.
 PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
     "wm1_01": ("blink_L", "blink_R", "browsRaiseInner_L", "browsRaiseInner_R"),
     "wm1_02": ("browsRaiseOuter_L", "browsRaiseOuter_R", "chinRaise_L", "chinRaise_R"),
@@ -93,7 +93,7 @@ PACKED_MASKS: Mapping[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Mask:
-    """A region's mask: a file and the channel of it, 0 to 3."""
+    """A region's mask: a file and its channel, 0 to 3."""
 
     path: Path
     channel: int
@@ -101,14 +101,14 @@ class Mask:
 
 @dataclass
 class TexturePlan:
-    """What was found.
+    """The found textures.
 
     Attributes:
-        files: (mesh base, role) -> file. Roles: color, normal, roughness, specular, cavity,
-            alpha, `color:1` to `color:3` and `normal:1` to `normal:3` for the wrinkle sets,
-            `map:<animated map>` for a mask that the file's metadata names.
+        files: (mesh base, role) -> file. Roles: color, normal, roughness, specular, cavity, alpha,
+            `color:1` to `color:3` and `normal:1` to `normal:3` for the wrinkle sets, `map:<animated
+            map>` for a mask named in the metadata of the file.
         masks: region as in `head_wm1_blink_L`, in lower case -> Mask.
-        missing: one sentence for each file that was named and is not there.
+        missing: one sentence for each named file that is missing.
     """
 
     files: dict[tuple[str, str], Path] = field(default_factory=dict)
@@ -116,7 +116,7 @@ class TexturePlan:
     missing: list[str] = field(default_factory=list)
 
     def of(self, base: str, role: str) -> Path | None:
-        """The file of an input of a mesh's material; None where none was found.
+        """The file of an input of a mesh's material; None if missing.
 
         Args:
             base: of the mesh's name, as in `files`.
@@ -125,7 +125,7 @@ class TexturePlan:
         return self.files.get((base, role))
 
     def summary(self) -> str:
-        """What was found, in words: `head: color, normal; teeth: color`; empty for nothing."""
+        """A summary of found textures: `head: color, normal; teeth: color`; empty for nothing."""
         found: dict[str, list[str]] = {}
         for base, role in self.files:
             found.setdefault(base, []).append(role.partition(":")[0])
@@ -152,14 +152,14 @@ def split_words(stem: str) -> list[str]:
 
 
 def read_name(stem: str) -> tuple[str, str, str] | None:
-    """What a texture's name says.
+    """The part, side and role in a texture's name.
 
     Args:
         stem: the file's name without its ending.
 
     Returns:
-        Part (head, body, eyes, teeth, tongue, lashes), side (left, right or empty) and role;
-        None for a name that is none of MetaHuman's.
+        Part (head, body, eyes, teeth, tongue, lashes), side (left, right or empty) and role; None
+        for other names.
     """
     part = role = number = side = ""
     for word in split_words(stem):
@@ -182,7 +182,7 @@ def read_name(stem: str) -> tuple[str, str, str] | None:
 
 
 def read_mask(stem: str) -> dict[str, int]:
-    """Regions whose masks a file holds, in lower case, with their channels; often none."""
+    """Regions of the masks in a file, in lower case, with their channels; often none."""
     word = stem.lower()
     packed = _PACKED.match(word)
     if packed:
@@ -197,7 +197,7 @@ def read_mask(stem: str) -> dict[str, int]:
 
 
 def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
-    """The part and side of a mesh, as `read_name` calls them.
+    """The part and side of a mesh, in the words of `read_name`.
 
     Args:
         base: mesh name without its LOD.
@@ -215,7 +215,7 @@ def part_of(base: str, kind: str, skins: Sequence[str]) -> tuple[str, str]:
 
 
 def folders_of(dna_path: Path, chosen: str = "") -> list[Path]:
-    """Folders to look in, the user's own first; only those that are there.
+    """Existing folders to search, the user's own first.
 
     Args:
         dna_path: of the DNA file.
@@ -252,12 +252,12 @@ def find(
     meshes: Iterable[tuple[str, str]],
     folders: Sequence[Path],
 ) -> TexturePlan:
-    """Look for textures: those that the file names, then those whose names say what they are.
+    """Find textures: first those named by the file, then those with known names.
 
     Args:
         wanted: (mesh base, role) -> file name, from_metadata.
         meshes: base and kind of each mesh.
-        folders: where to look, the first that has one wins.
+        folders: folders to search; the first with a match wins.
 
     Returns:
         The plan. A name from the file that is not a plain file name is never followed.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a picture of a mesh lies: its UV map, spread over the square, or a cell for each face."""
+"""UV layouts for baking a mesh: its UV map spread over the square, or a cell for each polygon."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _RIM = 0.08  # of a cell, left free on each side: no face shows its neighbour's 
 
 
 def spread(points: Float32) -> Float32 | None:
-    """A UV layout that uses little of the unit square, or leaves it, stretched over all of it.
+    """Stretch a UV layout over the unit square if it uses little of it or leaves it.
 
     Args:
-        points: float[N, 2] UV coordinates of all corners that share a picture.
+        points: float[N, 2] UV coordinates of all corners of a picture.
 
     Returns:
-        float32[N, 2], or None where the layout is good as it is.
+        float32[N, 2], or None if the layout is good already.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 1e-9)
@@ -31,10 +31,10 @@ def spread(points: Float32) -> Float32 | None:
 
 
 def overlaps(points: Float32, totals: Totals) -> bool:
-    """Whether faces must lie on each other: they are larger than the rectangle around them.
+    """Whether polygons must overlap, because their area exceeds their bounding rectangle.
 
     Args:
-        points: float[N, 2] UV coordinates of the corners, face after face.
+        points: float[N, 2] UV coordinates of the corners, polygon by polygon.
         totals: int[F] corners of each face.
     """
     if not len(points):
@@ -64,7 +64,7 @@ def cells(totals: Totals) -> Float32:
     first = np.repeat(np.cumsum(totals) - totals, totals)
     corner = np.arange(len(face)) - first
     angle = 2 * np.pi * (corner + 0.5) / totals[face]
-    # A square's corners lie at the square root of a half from its middle.
+    # The corners of a unit square lie at the square root of a half from its centre.
     reach = np.where(totals[face] == 4, np.sqrt(0.5), 0.5) * (1 - 2 * _RIM)
     place = np.stack([face % side, face // side], axis=1) + 0.5
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Actions with baked curves, and what an object was animated by before it played one."""
+"""Actions with baked curves, and the animation of an object before it played one."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Track:
 
     Attributes:
         path: its data path.
-        group: name of the group that its curves are shown in.
+        group: name of its group of curves.
         values: float32[frames, width].
-        now: what the property holds on the original, [width]; a property that holds one value
-            through the range and has it already needs no curve. None keys it in any case.
+        now: the current value of the original property, [width]. A property with this value at all
+            frames needs no curve. None: always make a curve.
         first: array index of the first column.
         indexed: whether the property is an array.
     """
@@ -50,7 +50,7 @@ class Track:
 
 @dataclass
 class Counts:
-    """What the reduction of keys did: keys written, keys without it, largest error."""
+    """Result of reducing keys: keys written, keys before the reduction, largest error."""
 
     keys: int = 0
     all_keys: int = 0
@@ -73,7 +73,7 @@ def write(
     error: float,
     counts: Counts,
 ) -> tuple[bpy.types.Action, bpy.types.ActionSlot | None]:
-    """A new action with one curve for each value that moves.
+    """Make an action with one curve for each value that moves.
 
     Args:
         name: of the action.
@@ -106,7 +106,7 @@ def add_tracks(
     """Add a curve for each value of tracks.
 
     Args:
-        bag: what holds the F-curves of an action; none of theirs.
+        bag: the F-curves of an action, without curves of these tracks.
         frames: float64[N].
         tracks: Tracks.
         error: see reduce_keys; 0 keeps a key at every frame.
@@ -175,12 +175,12 @@ def was_edited(action: bpy.types.Action) -> bool:
 
 
 def stamp(action: bpy.types.Action) -> None:
-    """Note what an action holds."""
+    """Store a digest of the keys of an action, to notice later edits."""
     action[_DIGEST] = _digest(action)
 
 
 def _digest(action: bpy.types.Action) -> str:
-    """What tells whether an action was edited since."""
+    """A digest of an action's keys; it differs after an edit."""
     found = hashlib.sha1(usedforsecurity=False)
     for curve in compat.curves_of(action):
         places = np.empty(len(curve.keyframe_points) * 2, np.float32)
@@ -197,7 +197,7 @@ def play(
     muted: Collection[str] = (),
     strip: bool = False,
 ) -> None:
-    """Let a datablock play a baked action and nothing else; what it played before is kept.
+    """Let a datablock play a baked action alone, and keep its earlier animation.
 
     Args:
         owner: object or Key, see `restore`.
@@ -235,7 +235,7 @@ def play(
 
 
 def keep(owner: Animated) -> None:
-    """Note on a datablock what animates it now, unless that is noted; give it animation data."""
+    """Store the current animation of a datablock unless it is stored; create animation data."""
     if BEFORE in owner:
         return
     had = owner.animation_data is not None
@@ -256,11 +256,11 @@ def keep(owner: Animated) -> None:
 
 
 def note_values(owner: Animated, paths: Iterable[str]) -> None:
-    """Note what properties hold that are not animated, or else than by what `play` plays.
+    """Store the values of properties that the baked action of `play` does not animate.
 
     Args:
         owner: object that plays a baked action from now on.
-        paths: data paths, which an action sets and nobody else sets back.
+        paths: data paths that the baked action sets; only `restore` sets them back.
     """
     lines = []
     for path in paths:
@@ -296,10 +296,10 @@ def _set(owner: Animated, path: str, number: float) -> None:
 
 
 def restore(owner: Animated) -> None:
-    """Let a datablock be animated again as it was before `play`.
+    """Restore the animation of a datablock before `play`.
 
-    What was baked goes, unless somebody else uses it, or the user protected or edited it; an action
-    that the user gave it meanwhile stays in the file.
+    Baked actions are removed, unless another datablock uses them, or the user protected or edited
+    them. An action that the user assigned since `play` stays in the file.
     """
     if BEFORE not in owner:
         return
@@ -355,12 +355,12 @@ def _is_used(action: bpy.types.Action) -> bool:
 
 
 def _noted(track: bpy.types.NlaTrack, mute: bool | int, solo: bool | int) -> str:
-    """What is kept of a track while a baked one is played: flags, and what it is known by."""
+    """The stored line of a track: its flags, its name and its strips."""
     return json.dumps([bool(mute), bool(solo), track.name, [s.name for s in track.strips]])
 
 
 def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
-    """What `_noted` wrote, or None where somebody else wrote something."""
+    """Read a line of `_noted`; None if the line has another form."""
     try:
         mute, solo, name, strips = json.loads(line)
         return bool(mute), bool(solo), str(name), [str(strip) for strip in strips]
@@ -369,10 +369,10 @@ def _track_noted(line: str) -> tuple[bool, bool, str, list[str]] | None:
 
 
 def note_tracks_by_name(owner: Animated) -> bool:
-    """Write what is kept of tracks in the present way: up to form 0 it was by their order.
+    """Rewrite stored tracks with their names; form 0 stored them by their order.
 
     Returns:
-        Whether there was anything to write.
+        Whether any stored track was rewritten.
     """
     state = saved.table(owner, BEFORE) or {}
     lines = saved.texts(state, "tracks")
@@ -419,7 +419,7 @@ def _remove_track(
 def _baked_strips(
     data: bpy.types.AnimData, state: Mapping[str, object]
 ) -> list[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
-    """Track and strip of what `play` put there, also where it was renamed or moved."""
+    """The track and strip that `play` added, also after the user renamed or moved them."""
     strips = [(track, strip) for track in data.nla_tracks for strip in track.strips]
     baked = state.get("baked")
     own = [(t, s) for t, s in strips if baked and set(compat.actions_in([s])) == {baked}]

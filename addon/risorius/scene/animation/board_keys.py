@@ -26,13 +26,13 @@ _NAMED = 4  # controls that a sentence on a loss names
 
 @dataclass
 class Converted:
-    """What became of a pose and its keys.
+    """Result of a conversion between sliders and board.
 
     Attributes:
-        loss: of raw controls, over the pose and all frames.
-        kept: the action of before, which nothing plays now; None where none was converted.
-        curves: how many F-curves were made.
-        idle: other actions that the face plays, with keys that move nothing now.
+        loss: largest loss of raw controls over the pose and all frames.
+        kept: the earlier action, which nothing plays now; None if no action was converted.
+        curves: number of new F-curves.
+        idle: other actions of the face whose keys have no effect now.
     """
 
     loss: board_fit.Loss = field(default_factory=board_fit.Loss)
@@ -42,7 +42,7 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """What a conversion lost, in numbers; None where nothing is to be seen of it.
+    """A sentence about the loss of a conversion; None if the loss is invisible.
 
     Args:
         loss: of a fit.
@@ -58,11 +58,11 @@ def lost(loss: board_fit.Loss) -> Sentence | None:
 
 
 def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
-    """Let the other one lead, in the pose that the face has.
+    """Switch between sliders and board, and keep the pose.
 
     Args:
         rig: a character with a face board.
-        by_board: the board is to lead, else the sliders.
+        by_board: True: the board leads; False: the sliders lead.
         with_keys: convert the keys of the action that the face plays, in a copy of it.
 
     Returns:
@@ -95,7 +95,7 @@ def switch(rig: ArmatureObject, by_board: bool, with_keys: bool) -> Converted:
 
 
 def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
-    """Put the other kind of board in the place of one, in its pose; keys go over as at a switch.
+    """Replace the board by the other kind. Pose and keys are converted as by `switch`.
 
     Args:
         context: with a view layer.
@@ -123,11 +123,11 @@ def exchange(context: Context, rig: ArmatureObject, kind: str) -> Converted:
 
 
 def onto_leader(rig: ArmatureObject, action: bpy.types.Action) -> list[Sentence]:
-    """Let a new action with keys of sliders move the face board where that leads.
+    """Convert a new action with keys of sliders to handles, if the face board leads.
 
     Args:
-        rig: the character that is to play it.
-        action: which nothing else plays.
+        rig: the character that will play it.
+        action: an action that no other datablock plays.
 
     Returns:
         Sentences for a report.
@@ -150,7 +150,7 @@ def animates_sliders(rig: ArmatureObject) -> bool:
 
 
 def _pose(rig: ArmatureObject, by_board: bool) -> board_fit.Loss:
-    """Convert the pose of now. Returns: what it loses."""
+    """Convert the current pose. Returns: its loss."""
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
     assert face is not None
@@ -179,9 +179,10 @@ def _leading_curves(
 def convert(
     rig: ArmatureObject, action: bpy.types.Action, by_board: bool
 ) -> tuple[board_fit.Loss, int]:
-    """Convert the keys of an action in place: straight lines within TOLERANCE of what was there.
+    """Convert the keys of an action in place: straight lines within TOLERANCE of the earlier
+    curves.
 
-    What has no key stands as it stands now.
+    Controls without keys keep their current value.
 
     Args:
         rig: the character.
@@ -189,7 +190,7 @@ def convert(
         by_board: to keys on the handles, else to keys on the sliders.
 
     Returns:
-        What is lost of raw controls at whole frames and at the keys, and how many curves were made.
+        The loss of raw controls at whole frames and at the keys, and the number of new curves.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     curves = list(_leading_curves(action, controls, live, not by_board))

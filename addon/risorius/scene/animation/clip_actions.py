@@ -32,13 +32,13 @@ _ROTATIONS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_
 
 @dataclass
 class Report:
-    """What became of a clip.
+    """Result of importing a clip.
 
     Attributes:
-        action: the action that was made.
-        first, last: the frames that it spans.
-        curves: how many controls and bones it moves.
-        unknown: names of the clip that this face has no control for.
+        action: the new action.
+        first, last: its first and last frame.
+        curves: number of controls and bones that it moves.
+        unknown: names of the clip without a control of this face.
         notes: sentences for the user.
     """
 
@@ -72,14 +72,14 @@ def timing_of(
     keep_clock: bool = False,
     whole: bool = False,
 ) -> clip_units.Timing:
-    """Where a clip lies in a scene.
+    """Place a clip in the time of a scene.
 
     Args:
         clip: risorius.Clip.
         scene: gives the rate.
         start: the frame of the clip's first sample, or, with keep_clock, of its second 0.
-        keep_clock: count from the clip's own second 0, as for tracks that belong together.
-        whole: whether keys lie on whole frames only.
+        keep_clock: count from second 0 of the clip, to keep several clips of one take in step.
+        whole: True: keys on whole frames only.
     """
     origin = 0.0 if keep_clock else float(clip.start)
     return clip_units.Timing(frame_rate(scene), float(start), origin, whole)
@@ -98,22 +98,22 @@ def make_action(
     with_eyes: bool = True,
     tolerance: float = 0.0,
 ) -> Report:
-    """Make an action of a clip; nothing plays it yet.
+    """Make an action of a clip. No datablock plays it yet.
 
     Args:
         rig: the character's deforming armature.
-        clip: risorius.Clip; "head.yaw" and its like turn the bones of head, neck and eyes.
+        clip: risorius.Clip; curves such as "head.yaw" turn the bones of head, neck and eyes.
         timing: see timing_of.
         name: of the action.
-        with_eyes: also turn the eye bones, where the clip has eye rotation.
-        tolerance: how far a slider may be from the clip, so that few keys with handles do; turns
-            of bones keep to a tenth of it. 0: a key for each sample, and straight lines.
+        with_eyes: turn the eye bones too, if the clip has eye rotations.
+        tolerance: largest distance of a slider from the clip, with few keys and handles; a tenth of
+            it for rotations of bones. 0: a key for each sample and straight lines.
 
     Returns:
         Report.
 
     Raises:
-        clip_units.ClipError: nothing in it is for this face, or it is beyond what Blender plays.
+        clip_units.ClipError: no curve fits this face, or its frames lie outside Blender's range.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     times = clip.frame_times()
@@ -171,13 +171,13 @@ def _span(frames: NDArray[np.float64], whole: bool) -> tuple[float, float]:
 
 
 def set_range(scene: bpy.types.Scene, report: Report, mode: str) -> None:
-    """Let a scene last as long as what was imported.
+    """Adapt the frame range of a scene to an import.
 
     Args:
         scene: its range is changed.
         report: Report.
-        mode: "EXTEND" ends it where the animation ends, if that is later; "FIT" begins and ends it
-            with the animation; "KEEP" leaves it.
+        mode: "EXTEND" moves the end of the scene to the end of the animation if that is later;
+            "FIT" begins and ends it with the animation; "KEEP" leaves it.
     """
     first, last = math.floor(report.first + 1e-4), math.ceil(report.last - 1e-4)
     if mode == "FIT":
@@ -205,12 +205,12 @@ def _fill(
 
 
 def add_keys(curve: bpy.types.FCurve, keys: Bezier, bent: bool) -> None:
-    """Add keys; those that the curve has stay as they are.
+    """Add keys to a curve and keep its existing keys.
 
     Args:
         curve: of an action.
-        keys: on frames where the curve has none.
-        bent: whether the curve bends between them; else it is straight.
+        keys: at frames without a key of the curve.
+        bent: True: Bezier handles; False: straight lines.
     """
     points = curve.keyframe_points
     first, count = len(points), len(keys.co)
@@ -284,10 +284,10 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
 
     Args:
         rig: its deforming armature.
-        action: any action; where it has slots, the one that fits the control armature is played.
+        action: any action; of an action with slots, the slot for the control armature is played.
 
     Returns:
-        The action that it played before, now kept by a fake user; None where there was none.
+        The earlier action, kept by a fake user; None if there was none.
     """
     controls = parts.controls_there(rig)
     data = controls.animation_data_create()
@@ -300,12 +300,12 @@ def play(rig: ArmatureObject, action: bpy.types.Action) -> bpy.types.Action | No
 
 
 def add_strip(rig: ArmatureObject, action: bpy.types.Action, name: str = "") -> bpy.types.NlaStrip:
-    """Play an action as a strip of a new NLA track, where its keys are.
+    """Play an action as a strip of a new NLA track at the frames of its keys.
 
     Args:
         rig: deforming armature of the character.
         action: any action.
-        name: of the track and the strip; "" for the action's.
+        name: of the track and the strip; "" for the name of the action.
 
     Returns:
         The strip.
@@ -333,15 +333,15 @@ def clip_of_action(
     """Sample an action as a clip.
 
     Args:
-        controls: the control armature that would play it.
+        controls: the control armature of the face.
         live: the character's Runtime.
-        action: the action.
-        frames: float64[n], ascending, of the action's own clock.
+        action: the action to sample.
+        frames: float64[n], ascending frames of the action.
         rate: frames per second of the scene; frame 0 is second 0 of the clip.
 
     Returns:
-        risorius.Clip of the sliders that it moves, by their property names, and the names of
-        `clip_units.BONES` where it turns control bones or moves the gaze target. See dna_names.
+        risorius.Clip with curves of the moved sliders by their property names, and of moved control
+        bones and gaze target by the names of `clip_units.BONES`. See dna_names.
     """
     frames = np.asarray(frames, np.float64)
     curves = {(c.data_path, c.array_index): c for c in playing_curves(action, controls)}
@@ -371,13 +371,13 @@ def clip_of_action(
 
 
 def dna_names(live: runtime.Runtime, names: Iterable[str]) -> list[str]:
-    """The names that other characters know: the DNA's instead of Blender's cut ones.
+    """Names of the DNA file instead of Blender's shortened names, for other characters.
 
-    A slider keeps Blender's where the DNA has a name twice; what is no slider keeps its own.
+    A slider keeps Blender's name if the DNA file has its name twice. Other names stay.
 
     Args:
         live: the character's Runtime.
-        names: of its sliders, as Blender's properties are called, and of anything else.
+        names: Blender's property names of its sliders, and other names.
 
     Returns:
         As many names, in the same order.
@@ -403,7 +403,7 @@ def key_points(curve: bpy.types.FCurve) -> NDArray[np.float32]:
 
 
 def is_bent(curve: bpy.types.FCurve) -> bool:
-    """Whether an F-curve is anything else than straight lines from key to key, held outside."""
+    """Whether an F-curve differs from straight lines between keys with constant extrapolation."""
     if len(curve.modifiers) or curve.extrapolation != "CONSTANT":
         return True
     kinds = np.empty(len(curve.keyframe_points), np.int32)
@@ -412,11 +412,11 @@ def is_bent(curve: bpy.types.FCurve) -> bool:
 
 
 def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves by which an action moves a datablock, without those that are muted.
+    """The F-curves of an action that move a datablock, without muted ones.
 
     Args:
         action: any action.
-        owner: the object or the shape keys; where the action has slots, its slot is read.
+        owner: the object or the shape keys; of an action with slots, its slot is read.
     """
     return [
         c for c in compat.curves_for(action, owner) if not (c.mute or (c.group and c.group.mute))
@@ -425,13 +425,13 @@ def playing_curves(action: bpy.types.Action, owner: Animated) -> list[bpy.types.
 
 @dataclass(frozen=True)
 class Turning:
-    """What turns a control bone in an action.
+    """The rotation of a control bone in an action.
 
     Attributes:
-        mode: as PoseBone.rotation_mode.
-        path: of the property that turns it in this mode.
-        curves: one of each number of it, None where there is none.
-        rest: its numbers for a bone that is not turned.
+        mode: its PoseBone.rotation_mode.
+        path: data path of the rotation property of this mode.
+        curves: one F-curve for each component; None for a component without a curve.
+        rest: components of the rest rotation.
     """
 
     mode: str
@@ -447,7 +447,7 @@ class Turning:
 def turning(
     bone: bpy.types.PoseBone | None, curves: Mapping[tuple[str, int], bpy.types.FCurve]
 ) -> Turning | None:
-    """The curves that turn a control bone, or None where there are none.
+    """The curves that rotate a control bone; None if there are none.
 
     Args:
         bone: of the control armature.
@@ -466,7 +466,7 @@ def turning(
 def turning_in(
     bone: bpy.types.PoseBone, mode: str, curves: Mapping[tuple[str, int], bpy.types.FCurve]
 ) -> Turning:
-    """The curves that turn a control bone in one mode, or none.
+    """The curves that rotate a control bone in one rotation mode.
 
     Args:
         bone: of the control armature.
@@ -532,13 +532,13 @@ def _from_bone(bone: bpy.types.PoseBone, turns: NDArray[np.float64]) -> NDArray[
 def add_sound(
     scene: bpy.types.Scene, path: str | Path, frame: float, name: str = ""
 ) -> bpy.types.SoundStrip:
-    """Put a sound strip into the sequencer, on the first channel that is free there.
+    """Put a sound strip into the sequencer, on the first free channel.
 
     Args:
         scene: the scene.
         path: of the sound file.
-        frame: where its first sample is heard; strips lie on whole frames.
-        name: of the strip; empty for the file's.
+        frame: frame of its first sample; strips lie on whole frames.
+        name: of the strip; empty for the name of the file.
 
     Returns:
         The strip.
@@ -562,6 +562,6 @@ def add_sound(
 
 
 def _free(strips: Iterable[bpy.types.Strip], start: int) -> int:
-    """The first channel on which nothing lies at or after a frame."""
+    """The first channel without a strip at or after a frame."""
     taken = {s.channel for s in strips if s.frame_final_end > start}
     return next(c for c in range(1, 129) if c not in taken or c == 128)

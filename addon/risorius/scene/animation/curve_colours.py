@@ -68,8 +68,8 @@ def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -
 
     Args:
         curve: of a slider, in its group.
-        label: the slider.
-        step: see colour_of; None counts the curves of its group.
+        label: name of the slider.
+        step: number of the shade, see colour_of; None: the number of curves in its group.
     """
     region = native.regions().of_slider(label)
     group = curve.group
@@ -86,10 +86,10 @@ def colour_action(controls: ArmatureObject, action: bpy.types.Action) -> int:
 
     Args:
         controls: control armature of the face.
-        action: any action; of one with slots the curves that move these controls.
+        action: any action; of an action with slots, the curves that move these controls.
 
     Returns:
-        How many curves were coloured.
+        The number of coloured curves.
     """
     bag = compat.bag_for(action, controls)
     if bag is None:

@@ -34,15 +34,15 @@ _AT = 1e-3  # frames that are the same
 
 @dataclass(frozen=True)
 class Rules:
-    """What Blender's settings say of new keys.
+    """Blender's settings for new keys.
 
     Attributes:
-        insert: whether keys are inserted at all.
-        replace: only where a curve has a key at the frame already.
-        available: only on curves that are there already.
-        needed: only where the curve shows another value.
-        kind: of key, as KEYFRAME or EXTREME.
-        interpolation, handles: of the first keys of a curve; later ones are as those before them.
+        insert: whether keys are inserted.
+        replace: only replace an existing key at the frame.
+        available: only on existing curves.
+        needed: only if the value differs from the curve.
+        kind: type of the key, such as KEYFRAME or EXTREME.
+        interpolation, handles: for the first keys of a curve; a later key copies the key before it.
         keying_set: the only set whose paths are keyed, or None.
     """
 
@@ -58,11 +58,11 @@ class Rules:
 
 @dataclass(frozen=True)
 class Pose:
-    """What an animator moves on the controls of a face.
+    """The values of the controls of a face that an animator sets.
 
     Attributes:
-        sliders: by their names.
-        bones: data path -> numbers, of each control bone's turn and place.
+        sliders: values by name.
+        bones: data path -> components of rotation and location of each control bone.
     """
 
     sliders: Mapping[str, float]
@@ -74,9 +74,9 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
 
     Args:
         context: gives both.
-        auto: for what an edit leaves behind it by itself, which takes auto-key; else for keys that
-            the animator asked for.
-        exact: insert also what seems not to be needed, for keys that make a shape together.
+        auto: True: for keys of an edit, which need auto-key; False: for keys that the animator
+            asked for.
+        exact: insert unneeded keys too, because the keys of a shape belong together.
     """
     tools, edit = context.scene.tool_settings, context.preferences.edit
     needed = getattr(edit, "use_keyframe_insert_needed", False)
@@ -96,9 +96,9 @@ def rules_of(context: Context, auto: bool = True, exact: bool = False) -> Rules:
 
 
 def pose_of(controls: ArmatureObject) -> Pose:
-    """What the controls show now: the original values, as a hand moves them.
+    """The current values of the controls, before drivers and layers.
 
-    Of the sliders and the handles of a face board those that lead.
+    It holds the leading ones of sliders and handles.
     """
     rig = parts.rig_of(controls)
     assert rig is not None
@@ -117,7 +117,8 @@ def pose_of(controls: ArmatureObject) -> Pose:
 
 
 def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set[str]]:
-    """The sliders that the face board leads, none where it does not; and its handles' bones."""
+    """The sliders that the face board leads, and the bones of its handles. Both are empty if the
+    sliders lead."""
     handles = {handle.bone for handle in live.handles}
     if not board.leads(controls, live):
         return set(), handles
@@ -126,14 +127,14 @@ def _led(controls: ArmatureObject, live: runtime.Runtime) -> tuple[set[str], set
 
 
 def _paths_of(bone: bpy.types.PoseBone) -> list[str]:
-    """The data paths of a control bone that an animator moves: what is locked is not keyed."""
+    """The data paths of a control bone that an animator moves; locked channels are not keyed."""
     names = [] if all(bone.lock_rotation) else [clip_actions.rotation_path(bone)]
     names += [] if all(bone.lock_location) else ["location"]
     return [f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name}' for name in names]
 
 
 def curves_by_path(controls: ArmatureObject) -> dict[str, list[bpy.types.FCurve]]:
-    """Data path -> the F-curves of it, of the action that the controls play."""
+    """Data path -> its F-curves in the action of the controls."""
     data = controls.animation_data
     found: dict[str, list[bpy.types.FCurve]] = {}
     if data is not None and data.action is not None:
@@ -149,22 +150,23 @@ def by_hand(
     at_selected: bool = False,
     at: Callable[[float], object] | None = None,
 ) -> int:
-    """Move controls as Blender's own edits do: what is keyed after it is up to the user's settings.
+    """Move controls as Blender's own edits do, and key them by the user's settings.
 
     Args:
         context: has the settings and the current frame.
         rig: the character.
-        move: moves sliders and bones from what they show now; gives the names of the sliders that
-            it had in its hands, whether they changed or not, or None where it did nothing.
-        at_selected: do it at every frame with a selected key of this face, with keys of what
-            changed, instead of at the current frame.
-        at: is told the frame before each move.
+        move: moves sliders and bones from their current values. It returns the names of the sliders
+            that it handled, or None if it did nothing.
+        at_selected: move at every frame with a selected key of this face instead of the current
+            frame, and key all changes.
+        at: called with the frame before each move.
 
     Returns:
-        How many properties were keyed.
+        The number of keyed properties.
 
     Raises:
-        FaceError: no key is selected; a tweak is on that does not reach here. All stands as before.
+        FaceError: no key is selected, or an active tweak does not reach this frame. Nothing has
+            changed.
     """
     controls = parts.controls_there(rig)
     shown_keys.show_some(controls)
@@ -196,18 +198,18 @@ def by_hand(
 def changed(
     context: Context, rig: ArmatureObject, labels: Iterable[str], bones: Iterable[str] = ()
 ) -> int:
-    """Key what an edit changed at the current frame, if Blender's settings say so.
+    """Key the changes of an edit at the current frame, if Blender's settings ask for it.
 
-    While a tweak is on, sliders and bones go into that instead.
+    While a tweak is on, the changes go into the tweak instead.
 
     Args:
         context: has the settings and the frame.
         rig: the character.
-        labels: sliders that were set.
-        bones: data paths of control bones that were moved, as Pose has them.
+        labels: changed sliders.
+        bones: data paths of moved control bones, as in Pose.
 
     Returns:
-        How many properties were keyed.
+        The number of keyed properties.
     """
     rules, controls = rules_of(context), parts.controls_there(rig)
     if tweaks.of(controls) is not None:
@@ -264,12 +266,12 @@ def selected_frames(controls: ArmatureObject) -> list[float]:
 
 
 def pose_at(controls: ArmatureObject, frame: float, now: Pose) -> Pose:
-    """What the action of the controls shows at a frame; what has no curve stands as it is.
+    """The pose of the controls' action at a frame; controls without curves keep their value.
 
     Args:
         controls: the control armature.
         frame: of the action; need not be whole.
-        now: what it shows at present.
+        now: the current pose.
     """
     keyed = curves_by_path(controls)
     sliders = dict(now.sliders)
@@ -315,7 +317,8 @@ def _at_selected(
     if not frames:
         raise FaceError(told("Select keys of this face first: there is no selected key."))
     now, rules, made = pose_of(controls), rules_of(context, auto=False), []
-    # All poses are read before the first key is set: a first key of a curve holds at all frames.
+    # Read all poses before the first key, because the first key of a curve changes it at all
+    # frames.
     for frame in frames:
         before = pose_at(controls, frame, now)
         show(controls, before)
@@ -340,17 +343,17 @@ def insert(
     frame: float,
     rules: Rules,
 ) -> int:
-    """Insert keys of the values that the controls show now.
+    """Insert keys with the current values of the controls.
 
     Args:
         controls: the control armature.
-        labels: its sliders that are keyed; those with a driver are left out.
-        bones: data paths of its bones.
+        labels: sliders to key; sliders with drivers are left out.
+        bones: data paths of bones to key.
         frame: of the scene; need not be whole.
-        rules: what may be keyed, and how.
+        rules: settings for new keys.
 
     Returns:
-        How many properties were keyed.
+        The number of keyed properties.
     """
     keyed, driven = curves_by_path(controls), _driven(controls)
     done = []
@@ -420,7 +423,8 @@ def _new_curves(bag: bpy.types.ActionChannelbag, path: str) -> list[bpy.types.FC
 
 
 def _finish(curve: bpy.types.FCurve, rules: Rules) -> None:
-    """Give the first keys of a curve what the preferences say; Blender does it for its own only."""
+    """Set interpolation and handles of the first keys of a curve by the preferences, as Blender
+    does for its own keys."""
     if len(curve.keyframe_points) > 2:
         return  # a later key is like the one before it
     for key in (
@@ -466,8 +470,8 @@ def in_set(controls: ArmatureObject, keying_set: bpy.types.KeyingSet, path: str)
 
     Args:
         controls: the control armature.
-        keying_set: one of the scene, with paths; or one of Blender's own, which say by their names
-            what of a bone they key.
+        keying_set: a keying set of the scene with paths, or a built-in one, whose name says which
+            channels of bones it keys.
         path: a data path.
     """
     if keying_set.is_path_absolute:

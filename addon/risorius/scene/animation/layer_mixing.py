@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The layers of a character, compiled to native curves and mixed over its sliders and bones.
 
-What is compiled is kept by the character and compared with what it was made of: a frame costs one
-look at the settings and one native call, and nothing at all without layers. No Blender object is
-kept.
+The compiled layers are kept for each character and compared with their settings. A frame costs one
+comparison and one native call, and nothing without layers. No Blender object is kept.
 """
 
 from __future__ import annotations
@@ -53,11 +52,12 @@ Source: TypeAlias = "tuple[native.Clip | dict[str, float], Times]"
 
 @dataclass
 class Bones:
-    """What the control bones ask for.
+    """Rotations and gaze target of the control bones.
 
     Attributes:
-        turns: of "head", "neck", "eye_L", "eye_R" in the armature's axes, without those that rest.
-        target: how far the gaze target was moved, in its own axes; None where it rests.
+        turns: rotations of "head", "neck", "eye_L", "eye_R" in axes of the armature; bones at rest
+            are left out.
+        target: displacement of the gaze target in its own axes; None at rest.
     """
 
     turns: dict[str, Quaternion] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class Bones:
 
 @dataclass
 class Kept:
-    """Sources and masks of layers, each by what it was made of."""
+    """Compiled sources and masks of layers, by the settings that they were made from."""
 
     sources: dict[tuple[object, ...], Source] = field(default_factory=dict)
     masks: dict[tuple[object, ...], NDArray[np.float32]] = field(default_factory=dict)
@@ -77,13 +77,13 @@ class Stack:
     """Compiled layers of a character.
 
     Attributes:
-        made_of: what they were compiled from.
+        made_of: the settings that they were compiled from.
         mixer: risorius.Mixer of the character's labels, then of `clip_units.BONES`.
         layers: risorius.Layer, bottom to top, at full weight.
-        places: of each the place among the settings.
+        places: place of each layer among the settings.
         weights: of all settings by place, as the mixer has them now.
-        problems: sentences on layers that cannot be played, by their place.
-        kept: sources and masks.
+        problems: place -> sentence about a layer that cannot be played.
+        kept: compiled sources and masks.
     """
 
     made_of: tuple[object, ...]
@@ -102,7 +102,8 @@ _versions: dict[int, int] = session.table("layer_mixing.versions", ("undo", "loa
 
 
 def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
-    """Drop what is kept of characters and actions that are gone. Args: there  control armatures."""
+    """Drop compiled layers of deleted characters and actions. Args: there control armatures that
+    exist."""
     kept = {controls.session_uid for controls in there if controls is not None}
     for uid in [uid for uid in _stacks if uid not in kept]:
         del _stacks[uid]
@@ -112,7 +113,7 @@ def forget_unused(there: Iterable[ArmatureObject | None]) -> None:
 
 
 def note_edits(actions: Iterable[bpy.types.Action]) -> None:
-    """Note that actions were edited: what is made of them is made anew."""
+    """Note edited actions, so that their layers are compiled again."""
     for action in actions:
         _versions[action.session_uid] = _versions.get(action.session_uid, 0) + 1
 
@@ -131,19 +132,19 @@ def mix(
         seen: the evaluated control armature; its layers have the weights of this frame.
         live: the character's Runtime.
         raw: float32[R], the sliders.
-        bones: how the control bones are turned and moved.
-        depsgraph: its scene gives the time.
+        bones: rotations and gaze target of the control bones.
+        depsgraph: gives the time of its scene.
         maximum: of the sliders.
 
     Returns:
-        float32[R], and what the control bones ask for with the layers.
+        float32[R] sliders, and the control bones with the layers.
     """
     controls = seen.original
     if not layers.has_any(controls) or parts.BAKED in controls:
         return raw, bones  # baked controls have them in their action
     scene = depsgraph.scene
     stack = compiled(controls, live, scene, maximum)
-    # Where there are not as many, one was added and not evaluated since.
+    # The numbers differ if a layer was added and not evaluated since.
     there = len(layers.places(seen)) == len(layers.places(controls))
     weights = tuple(layer.weight for layer in layers.places(seen if there else controls))
     if stack.weights != weights:
@@ -165,7 +166,7 @@ def _numbers(bones: Bones) -> NDArray[np.float32]:
 
 
 def _changed(bones: Bones, before: NDArray[np.float32], after: NDArray[np.float32]) -> Bones:
-    """What the control bones ask for with the layers; what no layer moves stays to the bit."""
+    """The control bones with the layers. Bones that no layer moves keep every bit."""
     if np.array_equal(before, after):
         return bones
     turns, target, at = dict(bones.turns), bones.target, 0
@@ -184,7 +185,7 @@ def _changed(bones: Bones, before: NDArray[np.float32], after: NDArray[np.float3
 def compiled(
     controls: ArmatureObject, live: runtime.Runtime, scene: bpy.types.Scene, maximum: float = 1.0
 ) -> Stack:
-    """The Stack of a character, compiled anew only where something changed.
+    """The Stack of a character. Only changed layers are compiled again.
 
     Args:
         controls: its control armature, the original one.
@@ -210,7 +211,7 @@ def _get(layer: RISORIUS_PG_layer, names: Iterable[str]) -> Iterator[object]:
 
 
 def _key(layer: RISORIUS_PG_layer, rate: float) -> tuple[tuple[object, ...], tuple[object, ...]]:
-    """What a layer's curves depend on, and what its mask does."""
+    """The settings that the curves of a layer depend on, and the settings of its mask."""
     action = layer.action
     uid = action.session_uid if action is not None else 0
     warp = tuple((point.frame, point.source) for point in layer.warp)
@@ -226,7 +227,7 @@ def _compile(
     made_of: tuple[object, ...],
     old: Stack | None,
 ) -> Stack:
-    """A new Stack. Args: old  the one before it, whose curves serve where they are the same."""
+    """A new Stack. Args: old the earlier Stack; unchanged curves are reused."""
     same = old if old is not None and old.made_of[0] == made_of[0] else None
     stack = Stack(made_of, _mixer(controls, live, maximum) if same is None else same.mixer)
     kept = Kept() if same is None else same.kept
@@ -245,7 +246,7 @@ def _compile(
 
 def _mixer(controls: ArmatureObject, live: runtime.Runtime, maximum: float) -> native.Mixer:
     ranges = {n: (low, maximum) for n, low in zip(live.labels, live.lowest, strict=True)}
-    # The gaze target stands anywhere; turns have no limits by their names.
+    # The gaze target and rotations have no limits.
     ranges |= dict.fromkeys(clip_logic.TARGET, (-np.inf, np.inf))
     return native.module().Mixer(
         [*live.labels, *clip_logic.BONES],
@@ -294,11 +295,12 @@ def native_layer(
         live: the character's Runtime.
         layer: its settings.
         rate: frames per second.
-        old: sources and masks made before, which serve again; the mixer knows them.
-        kept: where those of this layer are put.
+        old: earlier sources and masks to reuse; the mixer knows them.
+        kept: receives the sources and masks of this layer.
 
     Raises:
-        ValueError: it has nothing to play, or something that does not fit; the sentence says what.
+        ValueError: it has nothing to play, or its source does not fit; the sentence gives the
+            reason.
     """
     old, kept = old or Kept(), kept or Kept()
     source_key, mask_key = _key(layer, rate)
@@ -332,7 +334,7 @@ def _mask(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> NDArray[np.float32
 
 
 def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
-    """What a layer may move: sliders, and the numbers of control bones, `clip_units.BONES`.
+    """Names that a layer may move: sliders, and components of control bones (`clip_units.BONES`).
 
     Args:
         live: Runtime of the character, for the names of its sliders.
@@ -344,7 +346,7 @@ def allowed_names(live: runtime.Runtime, layer: RISORIUS_PG_layer) -> set[str]:
 
 
 def _still_times(layer: RISORIUS_PG_layer, rate: float) -> Times:
-    """A pose stands always, from its start on, or for its length."""
+    """Times of a pose: always, from its start on, or for its length."""
     if not layer.length:
         return {} if layer.extend == "HOLD" else {"start": layer.start / rate}
     return {"start": layer.start / rate, "end": (layer.start + layer.length) / rate}
@@ -358,7 +360,7 @@ def _expression_source(
 
 
 def _for_face(live: runtime.Runtime, pose: Mapping[str, float]) -> dict[str, float]:
-    """A pose by the labels of this face's sliders; what it does not have is left out."""
+    """A pose by slider labels of this face, without sliders that it lacks."""
     sliders = clip_actions.sliders_of(live)
     return {sliders[name]: value for name, value in pose.items() if name in sliders}
 

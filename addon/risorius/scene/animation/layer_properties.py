@@ -14,20 +14,20 @@ from ...language import tables
 from ...logic.animation import layer_rules
 
 KINDS = (
-    ("ACTION", "Action", "Keys of the controls, as of an import or of your own hand"),
-    ("EXPRESSION", "Expression", "A built-in pose that stands still"),
+    ("ACTION", "Action", "An action with keys of the controls"),
+    ("EXPRESSION", "Expression", "A built-in pose"),
     ("IDLE", "Idle Life", "Blinks, glances and small movements from a seed"),
 )
 BLENDS = (
-    ("OVERRIDE", "Override", "Replaces what lies below"),
-    ("ADD", "Add", "Is added to what lies below"),
-    ("MAXIMUM", "Maximum", "Counts where it is higher than what lies below"),
+    ("OVERRIDE", "Override", "Replace lower layers"),
+    ("ADD", "Add", "Add to lower layers"),
+    ("MAXIMUM", "Maximum", "Use the higher value of this layer and lower layers"),
 )
 EXTENDS = (
-    ("HOLD", "Hold", "Its first and last frames last"),
-    ("HOLD_FORWARD", "Hold Forward", "Nothing before it, its last frame lasts"),
-    ("NOTHING", "Nothing", "It moves nothing before its start and after its end"),
-    ("REPEAT", "Repeat", "Over and over, before and after"),
+    ("HOLD", "Hold", "Hold the first and last frames"),
+    ("HOLD_FORWARD", "Hold Forward", "Nothing before the start; hold the last frame"),
+    ("NOTHING", "Nothing", "Nothing before the start and after the end"),
+    ("REPEAT", "Repeat", "Repeat before and after"),
 )
 REGIONS = tuple((r.upper(), title, "") for r, title in native.regions().titles.items())
 INDEX = f"{layer_rules.COLLECTION}_index"
@@ -36,7 +36,7 @@ _OVERRIDE: Any = {"LIBRARY_OVERRIDABLE"}
 
 
 def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
-    """Let Blender evaluate the character; what is compiled is compared, and made anew."""
+    """Let Blender evaluate the character. Changed layers are then compiled again."""
     owner = self.id_data
     assert owner is not None
     owner.update_tag()
@@ -60,7 +60,7 @@ class RISORIUS_PG_reaction(bpy.types.PropertyGroup):
     """A reaction that is fired at a frame."""
 
     name: _still(bpy.props.StringProperty, name="Reaction")
-    frame: _still(bpy.props.FloatProperty, name="Frame", description="When it is fired")
+    frame: _still(bpy.props.FloatProperty, name="Frame", description="Frame of the reaction")
     strength: _still(
         bpy.props.FloatProperty, name="Strength", default=1.0, min=0.0, max=1.0, subtype="FACTOR"
     )
@@ -75,18 +75,18 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
         bpy.props.PointerProperty,
         type=bpy.types.Action,
         name="Action",
-        description="What the layer plays",
+        description="Kind of the layer",
     )
     expression: _still(bpy.props.StringProperty, name="Expression")
-    # Of the expressions that come with Risorius; files from before there were two do not say it.
+    # Edition of the expressions of Risorius; files from the time of one edition do not store it.
     edition: _still(bpy.props.IntProperty, name="Edition", default=1, min=1)
     seed: _still(
-        bpy.props.IntProperty, name="Seed", description="Another seed is another life", min=0
+        bpy.props.IntProperty, name="Seed", description="Seed of the random movement", min=0
     )
     blend: _still(bpy.props.EnumProperty, name="Blend", items=BLENDS)
     weight: bpy.props.FloatProperty(
         name="Weight",
-        description="How much the layer counts; can have keys",
+        description="Weight of the layer; it can have keys",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -97,34 +97,37 @@ class RISORIUS_PG_layer(bpy.types.PropertyGroup):
     regions: _still(
         bpy.props.EnumProperty,
         name="Regions",
-        description="The parts of the face that it moves; none chosen: all",
+        description="Regions that the layer moves; none: all",
         items=REGIONS,
         options={"ENUM_FLAG"},
     )
     controls: _still(
         bpy.props.StringProperty,
         name="Controls",
-        description="Only these: names or patterns as jawOpen mouth*; -name leaves one out",
+        description=(
+            "Controls that the layer moves, as names or patterns such as "
+            "jawOpen mouth*; -name excludes one"
+        ),
     )
     start: _still(bpy.props.FloatProperty, name="Start", default=1.0, description="Frame")
     scale: _still(
         bpy.props.FloatProperty,
         name="Time Scale",
-        description="2 is half as fast",
+        description="Factor of the length: 2 plays at half the speed",
         default=1.0,
         min=0.01,
         max=100.0,
     )
     trim_start: _still(
-        bpy.props.FloatProperty, name="Skip", description="Frames left out at its begin", min=0.0
+        bpy.props.FloatProperty, name="Skip", description="Frames to skip at the start", min=0.0
     )
     trim_end: _still(
-        bpy.props.FloatProperty, name="Cut", description="Frames left out at its end", min=0.0
+        bpy.props.FloatProperty, name="Cut", description="Frames to cut at the end", min=0.0
     )
     length: _still(
         bpy.props.FloatProperty,
         name="Length",
-        description="Frames; 0: always, from the start on",
+        description="Length in frames; 0: no end",
         min=0.0,
     )
     repeat: _still(bpy.props.FloatProperty, name="Repeat", default=1.0, min=0.01, max=1000.0)
@@ -161,14 +164,16 @@ def register() -> None:
         bpy.props.BoolProperty,
         name="Exclude Opposites",
         translation_context=tables.CONTEXT,
-        description="Where there are layers, controls that undo each other give way: closed lips "
-        "hold the jaw, a blink the wide lids",
+        description=(
+            "On a face with layers, keep opposite controls apart: closed lips"
+            " hold the jaw, a blink holds wide lids"
+        ),
         default=True,
     )
 
 
 def unregister() -> None:
-    """Take them away; what files hold of them stays."""
+    """Remove the properties; values in files stay."""
     for name in (layer_rules.COLLECTION, REACTIONS):
         delattr(bpy.types.Object, name)
         delattr(bpy.types.Object, f"{name}_index")

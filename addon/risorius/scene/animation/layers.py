@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The list of a character's layers: what is there, in which order, and changes of it."""
+"""The list of a character's layers: reading, ordering and changing it."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[R
 
 
 def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
-    """The layers that are there, bottom to top. Args: controls  the control armature."""
+    """The layers of a face, bottom to top. Args: controls the control armature."""
     return [layer for _place, layer in ordered(controls)]
 
 
 def ordered(controls: bpy.types.Object) -> list[tuple[int, RISORIUS_PG_layer]]:
-    """Place and layer of those that are there, bottom to top."""
+    """Place and layer of each layer, bottom to top."""
     there = ((i, layer) for i, layer in enumerate(places(controls)) if not layer.removed)
     return sorted(there, key=lambda pair: pair[1].rank)
 
@@ -64,7 +64,7 @@ def plays(controls: ArmatureObject, actions: Collection[bpy.types.Action]) -> bo
 
     Args:
         controls: control armature of the character.
-        actions: those that are looked for.
+        actions: actions to look for.
     """
     return any(layer.action in actions for layer in of(controls) if layer.action is not None)
 
@@ -89,7 +89,7 @@ def span_of(layer: RISORIUS_PG_layer, action: bpy.types.Action | None = None) ->
 
 
 def known_reactions() -> dict[str, native.Reaction]:
-    """Name -> what can be fired."""
+    """Name -> reaction that can be fired."""
     return native.part("anim.reactions").load_reactions()
 
 
@@ -98,16 +98,16 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
     Args:
         controls: control armature of the character.
-        action: any action; where it has slots, the one for these controls is read.
+        action: any action; of an action with slots, the slot for these controls is read.
     """
     path = parts.property_path("")[:-3]
     return any(c.data_path.startswith(path) for c in compat.curves_for(action, controls))
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Pin what a layer with an action shows at a frame of the scene to that frame.
+    """Pin the current time of a layer's action to a frame of the scene.
 
-    The first time its two ends are pinned too, so that nothing else changes.
+    The first pin also pins both ends, so that other frames stay.
     """
     span = span_of(layer)
     shown = float(span.source(np.array([frame]))[0])
@@ -126,12 +126,12 @@ def _add_point(layer: RISORIUS_PG_layer, frame: float, source: float) -> None:
 
 
 def add(controls: ArmatureObject, kind: str, name: str, **settings: object) -> RISORIUS_PG_layer:
-    """Put a new layer on top of the others and make it the active one.
+    """Add a layer on top and make it active.
 
     Args:
         controls: control armature.
         kind: see layer_properties.KINDS.
-        name: what the list shows; numbered where a layer has it already.
+        name: name in the list; a number is added if another layer has it.
         settings: other properties of the layer.
 
     Returns:
@@ -161,15 +161,15 @@ def _free_name(name: str, taken: Collection[str]) -> str:
 def add_action(
     controls: ArmatureObject, action: bpy.types.Action, **settings: object
 ) -> RISORIUS_PG_layer:
-    """A layer that plays an action where its keys are.
+    """Add a layer that plays an action at the frames of its keys.
 
     Args:
         controls: control armature of the character.
-        action: what is played, from the frame of its first key on.
+        action: action to play, from the frame of its first key on.
         settings: properties of the layer by name, as `add` takes them.
 
     Returns:
-        The layer, which is the highest.
+        The new layer, on top of the others.
     """
     first = action.frame_range[0]
     return add(controls, "ACTION", action.name, action=action, start=first, **settings)
@@ -186,9 +186,9 @@ def place_of(controls: ArmatureObject, layer: RISORIUS_PG_layer) -> int:
 
 
 def remove(controls: ArmatureObject, place: int) -> None:
-    """Remove a layer, and the keys of its weight where no other character plays them.
+    """Remove a layer, and the keys of its weight unless another character plays them.
 
-    Its place stays empty while an action has keys for it, so that they move no other layer.
+    Its place stays empty while an action has keys for it, so that these keys move no other layer.
 
     Args:
         controls: control armature of the character.
@@ -219,15 +219,15 @@ def _trim(controls: ArmatureObject) -> None:
 
 
 def move(controls: ArmatureObject, place: int, up: bool) -> bool:
-    """Put a layer one higher or lower; its place, and with it its keys, stay.
+    """Move a layer up or down in the list. Its place and keys stay.
 
     Args:
         controls: control armature of the character.
         place: of the layer, from place_of.
-        up: higher if true, else lower.
+        up: True: up; False: down.
 
     Returns:
-        Whether there was one to change with.
+        Whether it was moved.
     """
     there = of(controls)
     at = there.index(places(controls)[place])
@@ -247,7 +247,7 @@ def _rank(there: Sequence[RISORIUS_PG_layer]) -> None:
 
 
 def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
-    """Put a copy of a layer, with the keys of its weight, right above it.
+    """Add a copy of a layer, with the keys of its weight, above it.
 
     Args:
         controls: control armature of the character.
@@ -274,7 +274,7 @@ def duplicate(controls: ArmatureObject, place: int) -> RISORIUS_PG_layer:
 
 
 def _own_curve_lists(controls: ArmatureObject) -> Iterator[Any]:
-    """The lists of F-curves that move a control armature and nothing else, its drivers too."""
+    """The lists of F-curves that move this control armature alone, including its drivers."""
     played = [action for action in compat.played_actions(controls) if action.library is None]
     users = bpy.data.user_map(subset=played) if played else {}
     for action in played:
@@ -296,11 +296,11 @@ def _copy_curves(controls: ArmatureObject, place: int, to: int) -> None:
 
 
 def copy_keys(source: bpy.types.FCurve, target: bpy.types.FCurve) -> None:
-    """Give an F-curve without keys those of another, with their handles and interpolation.
+    """Copy the keys of an F-curve, with handles and interpolation, to an F-curve without keys.
 
     Args:
-        source: the F-curve that has keys; unchanged.
-        target: the F-curve that gets them.
+        source: the F-curve with keys; unchanged.
+        target: the F-curve without keys.
     """
     target.keyframe_points.add(len(source.keyframe_points))
     for new, old in zip(target.keyframe_points, source.keyframe_points, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Layers as tracks of Blender's own NLA, as far as it can say the same."""
+"""Convert layers to tracks of Blender's NLA."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ _BLENDS = {"OVERRIDE": "REPLACE", "ADD": "ADD"}
 
 
 def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
-    """Make strips of the layers, bottom to top, up to the first that no strip can say.
+    """Convert layers to strips, bottom to top, up to the first layer that no strip can represent.
 
-    The NLA lies below all layers, so what is above that one must stay a layer too. Layers that
-    were pushed are muted; the active action becomes the lowest of the new strips.
+    The NLA lies below all layers, so the layers above that one stay layers. Converted layers are
+    muted. The active action becomes the lowest new strip.
 
     Args:
-        scene: its rate and range count.
+        scene: gives the rate and the frame range.
         rig: the character.
 
     Returns:
-        How many layers were pushed, and sentences for the user.
+        The number of converted layers, and sentences for the user.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     settings = layers.of(controls)
@@ -61,7 +61,7 @@ def push(scene: bpy.types.Scene, rig: ArmatureObject) -> tuple[int, list[str]]:
 def obstacle(
     controls: ArmatureObject, layer: RISORIUS_PG_layer, curve: bpy.types.FCurve | None = None
 ) -> str:
-    """Why a strip cannot say the same as a layer; empty where it can.
+    """The reason why no strip can represent a layer; empty if one can.
 
     Args:
         controls: control armature.
@@ -176,7 +176,8 @@ def _set_influence(
 def _action_of(
     scene: bpy.types.Scene, rig: ArmatureObject, live: runtime.Runtime, layer: RISORIUS_PG_layer
 ) -> tuple[bpy.types.Action, bool]:
-    """An action with what the layer lets through: its own where that is all. Returns: it, still."""
+    """An action with the curves that the layer's mask allows; its own action if all are allowed.
+    Returns: the action, and whether it is a still pose."""
     controls = parts.controls_there(rig)
     if layer.kind == "ACTION":
         first, last = layer.action.frame_range
@@ -210,7 +211,7 @@ def _masked(
 
 
 def _is_left_out(path: str, allowed: Set[str]) -> bool:
-    """Whether a layer does not move what an F-curve moves."""
+    """Whether the mask of a layer excludes an F-curve."""
     for bone, names in clip_logic.TURNS.items():
         if path.startswith(f'pose.bones["{bone}"].rotation_'):
             return not allowed & set(names)

@@ -41,7 +41,7 @@ def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
 
 
 def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
-    """The one to take from: a selected one, else the only one, else None.
+    """The mesh to read: the selected one, or the only one, or None.
 
     Args:
         context: has the scene.
@@ -83,10 +83,10 @@ def recorded(
         context: scene and view layer.
         item: a mesh object with all its modifiers.
         first, last: frames.
-        progress: told the share that is done.
+        progress: called with the finished share, 0 to 1.
 
     Raises:
-        ClipError: no frame or too many, a modifier that changes how many vertices there are.
+        ClipError: no frame or too many, or a modifier changes the number of vertices.
     """
     count = last - first + 1
     if not 1 <= count <= MOST_FRAMES:
@@ -133,19 +133,19 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
         sparse: float,
         smooth: float,
     ) -> None:
-        """Look at Blender's things while the caller's thread may.
+        """Read Blender's data in the calling thread.
 
         Args:
             rig: the face.
-            item: that was recorded.
+            item: the recorded mesh.
             frames: float32[F, V, 3], as `recorded` gives them.
             rate: frames per second.
-            relative: the movement is taken and not the shape.
-            sparse, smooth: as of risorius.solve_clip.
+            relative: True: use the motion and not the form.
+            sparse, smooth: see risorius.solve_clip.
 
         Raises:
-            ClipError: a mesh that is none of the face's.
-            DnaError: a face that cannot be solved for.
+            ClipError: the mesh has the vertices of no mesh of the face.
+            DnaError: the face cannot be solved.
         """
         live = runtime.there(rig)
         lod, self.mesh = meant(rig, item)
@@ -173,15 +173,15 @@ class MeshCurvesTask(Task["native.SolvedClip"]):
 
 
 def show_residual(rig: ArmatureObject, mesh: int, residual: Floats) -> float:
-    """Paint what is left over onto a face's mesh, as a colour attribute.
+    """Paint the residual onto a mesh of a face, as a colour attribute.
 
     Args:
         rig: the face.
-        mesh: of the DNA.
+        mesh: index of the mesh in the DNA file.
         residual: float32[V] in mm.
 
     Returns:
-        The mm of the hottest colour; 0 where the face has no such mesh.
+        Millimetres of the hottest colour; 0 if the face lacks this mesh.
     """
     hottest = max(_HOTTEST_MM, float(residual.max(initial=0)))
     colours = heat_ramp.linear(heat_ramp.colours(residual.astype(np.float64) / hottest))

@@ -67,7 +67,7 @@ class RISORIUS_PG_range(bpy.types.PropertyGroup):
 
 
 def touch() -> None:
-    """Say that ranges may have changed: by a hand, undo, or another file."""
+    """Note that ranges may have changed by an edit, undo, or another file."""
     _changes.now += 1
 
 
@@ -82,10 +82,10 @@ def rows_of(controls: ArmatureObject) -> list[RISORIUS_PG_range]:
 
 
 def all_of(controls: ArmatureObject) -> "native.Ranges":
-    """The ranges of a face, also while they are switched off.
+    """The ranges of a face, also if they are off.
 
     Args:
-        controls: its control armature. A row whose numbers make no range counts as off.
+        controls: its control armature. A row without a valid range counts as off.
 
     Returns:
         risorius.ranges.Ranges.
@@ -115,7 +115,7 @@ def of(controls: ArmatureObject) -> "native.Ranges | None":
 
 
 def keep(controls: ArmatureObject, ranges: "native.Ranges") -> None:
-    """Let a face have ranges; those before them go.
+    """Replace the ranges of a face.
 
     Args:
         controls: its control armature.
@@ -170,6 +170,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them away; what files hold of them stays."""
+    """Remove the properties; values in files stay."""
     for name in _all():
         delattr(bpy.types.Object, name)

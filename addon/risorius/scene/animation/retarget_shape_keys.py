@@ -18,14 +18,14 @@ from . import clip_actions
 
 
 def sources(context: Context) -> list[MeshObject]:
-    """Mesh objects of the scene whose shape keys move and that are no part of a face."""
+    """Mesh objects of the scene with animated shape keys that belong to no face."""
     items = [item for item in context.scene.objects if item.type == "MESH"]
     meshes = cast(list[MeshObject], items)
     return [item for item in meshes if parts.rig_of(item) is None and _moves(item)]
 
 
 def source_of(context: Context) -> MeshObject | None:
-    """The one to take from: a selected one, else the only one of the scene, else None."""
+    """The mesh to read: the selected one, or the only one of the scene, or None."""
     there = sources(context)
     selected = cast(list[MeshObject], context.selected_objects)
     chosen = [item for item in selected if item in there]
@@ -50,18 +50,18 @@ def clip_of(
 ) -> native.Clip:
     """The shape keys of an object over time.
 
-    An action alone is read as it is; NLA strips and drivers are stepped through, frame by frame.
+    A single action is read directly. NLA strips and drivers are evaluated frame by frame.
 
     Args:
         context: scene and view layer.
         item: a mesh object.
-        first, last: frames; None for what its action spans, or the scene.
+        first, last: frames; None: the range of its action, or of the scene.
 
     Returns:
-        risorius.Clip, one curve per shape key that moves or is not 0; frame 0 is second 0.
+        risorius.Clip, one curve for each shape key that moves or is not 0; frame 0 is second 0.
 
     Raises:
-        ClipError: nothing of it moves.
+        ClipError: no shape key moves.
     """
     keys = parts.keys_there(item)
     data = keys.animation_data

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speech from a sound file, computed in a process beside Blender; and the recogniser's package."""
+"""Speech from a sound file in a process beside Blender, and the package of the recogniser."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class SpeechTask(Task["native.Clip"]):
     """A clip of speech on its way, made by a process."""
 
     def __init__(self, path: str, transcript: str | None, **options: object) -> None:
-        """Args: as of risorius.speech.speak."""
+        """Args: see risorius.speech.speak."""
         folder = str(packages_folder())
         if folder not in sys.path:
             sys.path.append(folder)  # the process looks for packages where this one does
@@ -47,7 +47,7 @@ class SpeechTask(Task["native.Clip"]):
 
 
 def has_recogniser() -> bool:
-    """Whether the recogniser can be imported; what was installed for the add-on counts."""
+    """Whether the recogniser can be imported, also from the add-on's own folder of packages."""
     importlib.invalidate_caches()
     places = [*sys.path, str(packages_folder())]
     return PathFinder.find_spec("pocketsphinx", places) is not None
@@ -62,19 +62,20 @@ def lacks_recogniser() -> bool:
 
 
 def packages_folder() -> Path:
-    """Where packages lie that the user installed for the add-on."""
+    """The folder of packages that the user installed for the add-on."""
     return Path(bpy.utils.extension_path_user(native.ADDON, path="packages", create=True))
 
 
 class InstallError(FaceError, RuntimeError):
-    """pip could not install the recogniser; the sentence says why."""
+    """pip could not install the recogniser; the sentence gives the reason."""
 
 
 def install_recogniser() -> None:
     """Install the recogniser with pip into the extension's own user folder.
 
     Raises:
-        InstallError: pip failed; the sentence says why. ValueError: there is no Python to run it.
+        InstallError: pip failed; the sentence gives the reason. ValueError: Blender has no Python
+            program.
     """
     python = native.part("speech.apart").python_program()
     options = ["--no-deps", "--only-binary", ":all:", "--require-hashes"]
@@ -99,7 +100,8 @@ def install_recogniser() -> None:
 
 
 def _bundled_pip() -> str:
-    """The wheel of pip that Python carries, which runs as it lies; "" where pip is installed."""
+    """The wheel of pip that comes with Python and runs without installation; "" if pip is
+    installed."""
     if importlib.util.find_spec("pip") is not None:
         return ""
     found = importlib.util.find_spec("ensurepip")

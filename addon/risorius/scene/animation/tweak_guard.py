@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Blender's own buttons do to a face while a tweak is on goes into the tweak too.
+"""Edits by Blender's own buttons go into the active tweak too.
 
-Blender knows no tweaks: its keys land in the action that the face plays. A copy of that action is
-kept in the file while a tweak is on, so that undo and redo have it; keys that came into the action
-since are taken out again, and their values go into the tweak. Sliders, bones and handles that were
-moved without a key go into the tweak when the frame changes. Other edits of the action stay: keys
-that were moved or deleted, and keys of what no tweak holds, as the place of the whole face.
+Blender puts its keys into the action of the face. While a tweak is on, the file keeps a copy of
+that action, so that undo and redo have it. New keys of the action are removed again, and their
+values go into the tweak. Sliders, bones and handles that were moved without a key go into the tweak
+when the frame changes. Other edits of the action stay: moved or deleted keys, and keys of
+properties that no tweak holds, such as the location of the whole face.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ Curves = dict[CurveName, bpy.types.FCurve]
 
 @dataclass
 class _Hand:
-    """What differs from the keys below and has no key there.
+    """Controls that differ from the keys below and have no key there.
 
     Attributes:
-        frame: of the scene.
-        stand: what was moved, and where it stands.
-        held: whether a key asked for it: it gets one in the tweak even where it does not differ.
+        frame: frame of the scene.
+        stand: the moved controls and their values.
+        held: True: the user inserted a key, so the tweak gets one even without a difference.
     """
 
     frame: float
@@ -61,12 +61,12 @@ class _Hand:
 
 @dataclass
 class _Below:
-    """What Blender was asked for: what stands below a tweak beside strips.
+    """The evaluated controls below a tweak on a face with NLA strips.
 
     Attributes:
-        frame: of the scene.
-        strips: what they were.
-        stand: what stands there.
+        frame: frame of the scene.
+        strips: the strips at that time.
+        stand: the values of the controls.
     """
 
     frame: float
@@ -103,7 +103,8 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
 
 
 def end(controls: ArmatureObject) -> None:
-    """Turn the tweak off. What was moved at the current frame goes into it before; it stays."""
+    """Turn the tweak off and keep its layer. Controls moved at the current frame go into it
+    first."""
     settle(controls)
     tweaks.end(controls)
     _drop(controls)
@@ -132,10 +133,10 @@ def _drop(controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
-    """Take keys that landed below the tweak into it, and note moves without a key.
+    """Move keys that landed below the tweak into it, and note moves without a key.
 
     Args:
-        controls: a control armature that was edited.
+        controls: an edited control armature.
         frame: of its scene.
         edited: whether its action was edited too.
     """
@@ -157,7 +158,8 @@ def note_edit(controls: ArmatureObject, frame: float, edited: bool) -> None:
 
 
 def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweaks.Stand:
-    """What stands below; while nothing but the controls is edited Blender is asked once."""
+    """The controls below the tweak. Blender evaluates them once until anything but the controls is
+    edited."""
     if not tweaks.is_mixed(controls):
         return tweaks.below_at(controls, tweak, frame)
     uid, strips = controls.session_uid, _strips(controls)
@@ -170,7 +172,7 @@ def _below(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> tweak
 
 
 def _strips(controls: ArmatureObject) -> tuple[object, ...]:
-    """What the strips of a face are, and how its action plays above them."""
+    """The strips of a face, and the blending of its action above them."""
     data = controls.animation_data
     assert data is not None
     own = (data.use_nla, data.action_influence, data.action_blend_type)
@@ -216,7 +218,7 @@ def _take(controls: ArmatureObject, hand: _Hand, old: tweaks.Curves | None = Non
 
 
 def _of(whole: tweaks.Stand, part: tweaks.Stand) -> tweaks.Stand:
-    """Of one pose what another one names."""
+    """The controls of one pose that another pose contains."""
     return tweaks.Stand(
         {n: v for n, v in whole.sliders.items() if n in part.sliders},
         {n: v for n, v in whole.places.items() if n in part.places},
@@ -261,7 +263,7 @@ def _hands_of(
     inserted: dict[CurveName, list[float]],
     frame: float,
 ) -> list[_Hand]:
-    """What new keys ask for: one at each of their frames, the current one last."""
+    """A _Hand for each frame with new keys, the current frame last."""
     held = _hands.get(controls.session_uid)
     by_frame: dict[float, list[bpy.types.FCurve]] = {}
     for name, frames in inserted.items():
@@ -306,9 +308,10 @@ def _take_all(
 
 
 def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
-    """The curves of an action that a tweak takes the place of: of sliders, handles and bones.
+    """The curves of an action that a tweak replaces: of sliders, handles and bones.
 
-    All channels of the bones belong to it: Blender also keys channels that the face does not use.
+    All channels of the bones are included, because Blender keys channels that the face does not
+    use.
     """
     rig = parts.rig_of(controls)
     handles = board.places_of(controls, runtime.there(rig)) if rig is not None else {}
@@ -375,7 +378,7 @@ def _restore(
 
 
 def _moved(controls: ArmatureObject, tweak: tweaks.Tweak, frame: float) -> _Hand | None:
-    """What differs from the keys below; None for nothing."""
+    """The controls that differ from the keys below; None if none does."""
     rig = parts.rig_of(controls)
     if rig is None:
         return None

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A tweak over a range: edits go into a layer that is added to the keys below and touches none.
+"""A tweak over a range: edits go into an additive layer above the keys, which stay as they are.
 
-While a tweak is on, what would be keyed is taken as its difference from what the keys below show;
-then the slider stands on these again, and the layer adds the difference. The same holds for the
-bones that turn head, neck and eyes, for the gaze target, and for the handles of a face board that
-leads.
+While a tweak is on, an edit becomes its difference from the keys below. The slider returns to the
+value of these keys, and the layer adds the difference. The same applies to the bones of head, neck
+and eyes, to the gaze target, and to the handles of a leading face board.
 """
 
 from __future__ import annotations
@@ -39,16 +38,16 @@ Rows = dict[str, tuple[float, ...]]
 
 @dataclass
 class Tweak:
-    """A tweak that is on.
+    """An active tweak.
 
     Attributes:
-        first, last: the frames at which it begins and ends, with nothing.
-        fade: frames from nothing to all of it, at each end.
+        first, last: its first and last frame, where its effect is 0.
+        fade: frames of the fade at each end.
         layer: name of its layer; empty until something is tweaked.
-        base: what the sliders without keys stand at, by their names.
-        places: where handles of the face board without keys stand, by their bones.
+        base: values of sliders without keys, by name.
+        places: places of handles without keys, by bone.
         bare: whether the face played no action when the tweak began.
-        bones: the same of the control bones, by the data paths of `paths_of`.
+        bones: components of control bones without keys, by the data paths of `paths_of`.
     """
 
     first: float
@@ -68,12 +67,12 @@ class Tweak:
 
 @dataclass
 class Stand:
-    """What stands in a pose of the controls.
+    """A pose of the controls.
 
     Attributes:
-        sliders: values by their names.
-        places: of handles of the face board, by their bones.
-        bones: numbers by the data paths of `paths_of`.
+        sliders: values by name.
+        places: places of handles of the face board, by bone.
+        bones: components by the data paths of `paths_of`.
     """
 
     sliders: dict[str, float] = field(default_factory=dict)
@@ -105,7 +104,7 @@ def of(controls: ArmatureObject) -> Tweak | None:
 
 
 def _is_sound(tweak: Tweak) -> bool:
-    """Whether a tweak that a file says to be on holds what it must."""
+    """Whether the stored data of a tweak in a file are complete."""
     base, places, bones = tweak.base, tweak.places, tweak.bones
     if not all(isinstance(part, dict) for part in (base, places, bones)):
         return False
@@ -158,21 +157,22 @@ def take(
     held: bool = False,
     old: Curves | None = None,
 ) -> int:
-    """Take what sliders and bones show as the tweak of a frame; then they stand as keys below say.
+    """Store sliders and bones as the tweak of a frame, and set them back to the keys below.
 
     Args:
-        controls: its control armature, with a tweak that is on.
-        labels: the sliders.
+        controls: control armature with an active tweak.
+        labels: sliders to store.
         frame: of the scene.
-        bones: data paths as of `paths_of`; others are passed over.
-        held: also what shows no difference gets a key where the tweak moves it already.
-        old: what the tweak adds so far, from `curves_so_far`; None for what it adds now.
+        bones: data paths of `paths_of`; others are ignored.
+        held: True: controls without a difference get a key too, if the tweak moves them already.
+        old: curves of the tweak so far, from `curves_so_far`; None: the current ones.
 
     Returns:
-        How many sliders and bones are tweaked by it.
+        The number of tweaked sliders and bones.
 
     Raises:
-        FaceError: the frame lies outside the tweak, or too near to its end for a turn so far.
+        FaceError: the frame lies outside the tweak, or too near to its end for such a large
+            rotation.
     """
     tweak = of(controls)
     assert tweak is not None
@@ -210,11 +210,11 @@ def take(
 
 
 def put_bones(controls: ArmatureObject, values: Mapping[str, Sequence[float]]) -> None:
-    """Bring control bones to where they stood.
+    """Set control bones to stored values.
 
     Args:
         controls: the control armature.
-        values: numbers by data path.
+        values: components by data path.
     """
     for path, numbers in values.items():
         owner, _, name = path.rpartition(".")
@@ -264,7 +264,7 @@ def _bone_rows(
     weight: float,
     held: bool,
 ) -> dict[str, list[float]]:
-    """What the layer needs at a frame so that bones stand as they stand now, by data path."""
+    """Values of the layer at a frame that reproduce the current bones, by data path."""
     rows = {}
     for path, name in asked.items():
         bone = controls.pose.bones[name]
@@ -323,7 +323,7 @@ def _insert(
 
 
 def is_mixed(controls: ArmatureObject) -> bool:
-    """Whether strips move the face too, and its action does not say alone what is shown."""
+    """Whether NLA strips move the face too, so that its action alone does not give the pose."""
     data = controls.animation_data
     if data is None:
         return False
@@ -342,11 +342,11 @@ def now(controls: ArmatureObject) -> Stand:
 
 
 def changed(stand: Stand, other: Stand) -> Stand:
-    """What of a pose differs from another one.
+    """The controls of a pose that differ from another pose.
 
     Args:
         stand: the pose.
-        other: the one it is compared with; what this does not name is left out.
+        other: the pose to compare with; controls that it lacks are left out.
     """
 
     def differing(rows: Rows, others: Rows) -> Rows:
@@ -365,7 +365,7 @@ def changed(stand: Stand, other: Stand) -> Stand:
 
 
 def put(controls: ArmatureObject, stand: Stand) -> None:
-    """Bring the controls to a pose; what it does not name stays.
+    """Set the controls to a pose; controls outside the pose stay.
 
     Args:
         controls: the control armature.
@@ -382,11 +382,11 @@ def put(controls: ArmatureObject, stand: Stand) -> None:
 def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
     """The values of the controls without the tweak.
 
-    Beside NLA strips Blender itself is asked, in a graph of its own.
+    On a face with NLA strips Blender evaluates them in a separate dependency graph.
 
     Args:
         controls: the control armature.
-        tweak: which is on.
+        tweak: the active tweak.
         frame: of the scene.
     """
     base = Stand(
@@ -409,7 +409,7 @@ def below_at(controls: ArmatureObject, tweak: Tweak, frame: float) -> Stand:
 
 
 def _shown(controls: ArmatureObject, base: Stand, frame: float) -> Stand:
-    """What Blender shows at a frame; what nothing moves stands as in a given pose."""
+    """The evaluated controls at a frame; controls that nothing moves keep the given pose."""
     data = controls.animation_data
     assert data is not None
     actions = compat.played_actions(controls) if data.use_nla else filter(None, [data.action])
@@ -429,7 +429,7 @@ def _shown(controls: ArmatureObject, base: Stand, frame: float) -> Stand:
 
 
 def _curves(controls: ArmatureObject) -> list[bpy.types.FCurve]:
-    """The curves that move the controls, without those that are muted."""
+    """The curves that move the controls, without muted ones."""
     data = controls.animation_data
     if data is None or data.action is None:
         return []

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face's animation as plain actions, and back to live.
 
-A baked face is moved by its actions alone: the evaluator leaves it, so nothing is driven twice,
-and the file looks the same in a Blender without the add-on. What animated each part before is kept
-on the part itself, in the file.
+Actions alone move a baked face. The evaluator leaves it, so nothing is driven twice, and the file
+looks the same in a Blender without the add-on. Each part stores its earlier animation in the file.
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ class BakeError(FaceError, RuntimeError):
 
 @dataclass(frozen=True)
 class BakeOptions:
-    """What is baked.
+    """Options of a bake.
 
     Attributes:
         kind: RESULT: bones, shape keys and maps; CONTROLS: sliders and control bones.
-        start, end, step: frames; the step may be a part of one.
-        lod: level of detail of a RESULT; -1 for the one that the viewport shows.
-        wanted: of a RESULT: some of "BONES", "SHAPES", "MAPS"; the rest stays as it stands.
-        error: keys are left out while straight lines stay within it, see key_reduction.reduce_keys.
+        start, end, step: frames; the step may be a fraction.
+        lod: level of detail of a RESULT; -1: the level in the viewport.
+        wanted: parts of a RESULT, some of "BONES", "SHAPES", "MAPS"; other parts keep their state.
+        error: largest error of removed keys, see key_reduction.reduce_keys.
         strip: put the actions onto new NLA tracks.
     """
 
@@ -58,7 +57,7 @@ class BakeOptions:
 
 
 def baked(rig: ArmatureObject) -> str:
-    """What of a character is baked: RESULT, CONTROLS or "" for live."""
+    """The kind of bake of a character: RESULT, CONTROLS or "" for live."""
     if parts.BAKED in rig:
         return RESULT
     controls = parts.controls_of(rig)
@@ -66,7 +65,7 @@ def baked(rig: ArmatureObject) -> str:
 
 
 def words(rig: ArmatureObject) -> str:
-    """What the panel says of a baked character; empty for a live one."""
+    """The sentence of the panel about a baked character; empty for a live one."""
     kind = baked(rig)
     if not kind:
         return ""
@@ -83,16 +82,16 @@ def words(rig: ArmatureObject) -> str:
 
 
 def _kept(owner: ArmatureObject) -> Mapping[str, object]:
-    """The notes of a bake on an armature; empty where they are no table of ours."""
+    """The stored notes of a bake on an armature; empty if they have another form."""
     return saved.table(owner, parts.BAKED) or {}
 
 
 def refusal(rig: ArmatureObject, kind: str) -> str:
-    """Why a character cannot be baked now, in one sentence; empty when it can.
+    """The reason why a character cannot be baked now, in one sentence; empty if it can.
 
     Args:
         rig: its deforming armature.
-        kind: what would be baked: CONTROLS or RESULT.
+        kind: kind of bake: CONTROLS or RESULT.
     """
     if baked(rig) in (RESULT, kind):
         return f"{rig.name} is baked already: choose Back to Live first."
@@ -114,7 +113,7 @@ def refusal(rig: ArmatureObject, kind: str) -> str:
 def bake(
     context: Context, rigs: Sequence[ArmatureObject], options: BakeOptions
 ) -> Generator[float, None, list[str]]:
-    """Bake characters; a generator, so that it can show progress and be ended without damage.
+    """Bake characters; a generator that shows progress and can be cancelled without damage.
 
     Args:
         context: scene and view layer.
@@ -122,14 +121,14 @@ def bake(
         options: BakeOptions.
 
     Yields:
-        The share that is done, 0 to 1. Nothing is changed before the last one.
+        The finished share, 0 to 1. Nothing changes before the last one.
 
     Returns:
         Sentences for a report, one for each character.
 
     Raises:
-        BakeError: one of them cannot be baked; none was.
-        ValueError: the range is none.
+        BakeError: a character cannot be baked; none was baked.
+        ValueError: the range has no frame.
     """
     for rig in rigs:
         trouble = refusal(rig, options.kind) or controls_ahead.examine(
@@ -189,11 +188,11 @@ def shown(rig: ArmatureObject, level: int) -> list[MeshObject]:
 
 
 def animated_keys(rig: ArmatureObject, level: int) -> list[tuple[MeshObject, list[str]]]:
-    """The shape keys that actions of the user's move.
+    """The shape keys that the user's own actions move.
 
     Args:
         rig: deforming armature of the character.
-        level: of detail; only meshes that it shows are looked at.
+        level: level of detail; only its meshes count.
 
     Returns:
         (mesh, data paths) of each mesh that has such keys.
@@ -287,14 +286,14 @@ def _write_controls(
 
 
 def unbake(context: Context, rig: ArmatureObject) -> bool:
-    """Back to live: what was before the last bake moves the character again.
+    """Back to live: restore the animation before the last bake.
 
     Args:
         context: scene and view layer.
         rig: the deforming armature.
 
     Returns:
-        Whether it was baked.
+        Whether the character was baked.
     """
     kind = baked(rig)
     if not kind:
@@ -310,7 +309,7 @@ def unbake(context: Context, rig: ArmatureObject) -> bool:
 
 
 def _take_back(rig: ArmatureObject, kind: str) -> None:
-    """Undo what a bake that failed has written on a character: all of it, or a part."""
+    """Undo the writes of a failed bake on a character, complete or partial."""
     controls = parts.controls_there(rig)
     if kind == CONTROLS and parts.BAKED in controls:
         _restore_controls(controls)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape keys that bear baked values: those of a mesh in LIVE mode are made for it and go again."""
+"""Shape keys for baked values. A mesh in LIVE mode gets them for the bake and loses them
+afterwards."""
 
 from __future__ import annotations
 
@@ -13,15 +14,15 @@ OPENED = "risorius_opened"  # on a Key: names of the keys that were made for a b
 
 
 def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict[int, str]:
-    """The real keys of a mesh by channel; a mesh in LIVE mode gets those that the bake needs.
+    """The real keys of a mesh by channel; a mesh in LIVE mode gets the keys that the bake needs.
 
     Args:
         item: mesh object.
         live: its character's Runtime.
-        used: channels that are not zero all through the bake.
+        used: channels that differ from 0 in the bake.
 
     Returns:
-        Channel -> key name; empty where the mesh has other vertices than its file.
+        Channel -> key name; empty if the vertices of the mesh differ from its file.
     """
     dna_mesh = runtime.dna_mesh(live, item)
     key = item.data.shape_keys
@@ -44,10 +45,10 @@ def opened(item: MeshObject, live: runtime.Runtime, used: Iterable[int]) -> dict
 
 
 def close(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> None:
-    """Take the keys away that a bake needed; what was edited stays a real, driven key.
+    """Remove the keys of a bake. Edited keys stay as real, driven keys.
 
     Args:
-        item: mesh object, whose baked action is gone.
+        item: mesh object without its baked action.
         rig: its deforming armature.
         live: its Runtime.
     """

@@ -32,10 +32,10 @@ def evaluate(live: runtime.Runtime, samples: sampling.Samples, lod: int) -> nati
     Args:
         live: the character's Runtime.
         samples: from sampling.sample, of N frames.
-        lod: level of detail at which the rig is evaluated.
+        lod: level of detail.
 
     Returns:
-        A risorius.Pose whose fields have a leading N.
+        A risorius.Pose with arrays of N frames.
     """
     return live.rig.evaluate_batch(samples.raw, lod)
 
@@ -48,7 +48,7 @@ def rig_tracks(
     wanted: Collection[str],
     target: ArmatureObject | None = None,
 ) -> list[Track]:
-    """What moves the deforming armature.
+    """Tracks of the deforming armature.
 
     Args:
         rig: the character's deforming armature.
@@ -56,8 +56,8 @@ def rig_tracks(
         samples: sampling.Samples.
         pose: from `evaluate`.
         wanted: some of "BONES", "MAPS".
-        target: the armature that is to play it, which gets the values of the first frame; a copy
-            of the rig, or None for itself.
+        target: the armature that will play them and gets the values of the first frame: a copy of
+            the rig, or None for the rig.
 
     Returns:
         Tracks.
@@ -84,7 +84,7 @@ def _is_array(path: str) -> bool:
 
 
 def _others(values: Mapping[str, list[list[float]]], owner: bpy.types.ID) -> Iterator[Track]:
-    """Tracks of what else is animated, sampled by its paths."""
+    """Tracks of other animated properties, from their samples."""
     for path, rows in values.items():
         group = path.split('"')[1] if '"' in path else "Object Transforms"
         indexed = len(rows[0]) > 1
@@ -131,7 +131,7 @@ _OWNED = (("location", 3), ("rotation_quaternion", 4), ("scale", 3))
 
 
 def _place(rig: ArmatureObject, samples: sampling.Samples, target: ArmatureObject) -> list[Track]:
-    """Where the face stands, where it follows the control armature."""
+    """The track of the face's place, if it follows the control armature."""
     if not rig.get(parts.FOLLOW) or rig.parent or rig.constraints:
         return []
     matrices = samples.places
@@ -193,13 +193,13 @@ def key_tracks(
     weights: NDArray[np.float32],
     others: Mapping[str, list[list[float]]] | None = None,
 ) -> list[Track]:
-    """What moves the shape keys of a mesh, whose keys get the values of the first frame.
+    """Tracks of the shape keys of a mesh. The keys get the values of the first frame.
 
     Args:
         key: the Key.
         names: channel -> key name.
         weights: float32[N, B] of a Pose.
-        others: (path -> values) of keys that the user animates, see Samples.
+        others: path -> values of keys that the user animates, see Samples.
 
     Returns:
         Tracks.
@@ -220,7 +220,7 @@ def key_path(name: str) -> str:
 def control_tracks(
     controls: ArmatureObject, live: runtime.Runtime, samples: sampling.Samples
 ) -> list[Track]:
-    """What moves the control armature: sliders, control bones, and all else animated on it.
+    """Tracks of the control armature: sliders, control bones, and other animated properties.
 
     Args:
         controls: control armature.
@@ -228,7 +228,7 @@ def control_tracks(
         samples: sampling.Samples.
 
     Returns:
-        Tracks. A slider or bone that rests through the range has none.
+        Tracks. A slider or bone at rest in the whole range has no track.
     """
     face = controls.pose.bones[parts.FACE]
     found = {t.path: t for t in _others(samples.others.get(controls, {}), controls)}

@@ -26,8 +26,8 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         A sentence for a report.
 
     Raises:
-        BakeError: there is nothing to bake, or a face cannot be at its place in time; what was
-            baked of it is freed.
+        BakeError: the scene has nothing to bake, or a face cannot be evaluated before its frame;
+            started bakes are freed.
     """
     found = [cache for _key, cache in caches.of_scene(context.scene)]
     count = len(found)
@@ -35,7 +35,7 @@ def bake(context: Context, rigs: Sequence[ArmatureObject]) -> Sentence:
         raise BakeError(told("There is no simulation with a cache in this scene."))
     begin = min(cache.frame_start for cache in found)
     if begin < 0:
-        # It counts a cache's frames without a sign: those below 0 read as the last one.
+        # Blender counts frames of a cache without a sign: negative frames read as the last one.
         raise BakeError(
             told(
                 "A simulation's cache begins at frame {begin}. Blender loses baked frames below 0: "

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves a face, frame by frame over a range, without disturbing the scene.
+"""The inputs of a face, frame by frame over a range, without changing the scene.
 
-Blender itself evaluates actions, NLA, drivers, constraints and bodies, in a scene of our own that
-has only the face's two armatures and what they depend on: so every frame is what frame stepping
-gives, the rest of the user's scene costs nothing, and its frame never changes.
+Blender evaluates actions, NLA, drivers, constraints and bodies in a separate scene that has only
+the two armatures of the face and the objects they depend on. Every frame equals the result of frame
+stepping, other objects of the scene cost nothing, and the frame of the scene never changes.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ _BONES = ("neck", "head", "eyes", "eye_L", "eye_R")
 
 @dataclass
 class Samples:
-    """What was read of one face.
+    """The inputs of one face.
 
     Attributes:
         frames: float64[N].
-        times: float64[N] where actions are read at these frames: Time Stretching moves them apart.
-        raw: float32[N, R] raw controls as the rig is evaluated with them.
-        sliders: float32[N, R] the same before the eye bones add to the look controls; both with
-            the layers.
-        turns: per frame "neck", "head" -> Quaternion, as inputs.read_inputs gives them.
-        basis: control bone -> float64[N, 4, 4], local to its rest, after constraints and layers.
+        times: float64[N], the frames at which actions are read; Time Stretching makes them differ.
+        raw: float32[N, R], the raw controls for the rig.
+        sliders: float32[N, R], the raw controls before the eye bones add to the look controls. Both
+            include the layers.
+        turns: for each frame "neck", "head" -> Quaternion, see inputs.read_inputs.
+        basis: control bone -> float64[N, 4, 4], relative to its rest, after constraints and layers.
         places: float64[N, 4, 4] of the control armature in the world.
-        bones: "location", ... -> float32[N, bones, width] of the deforming armature's bones as
-            they are without the evaluator; None where nothing animates them.
-        others: id -> {(path, first index): list of values} of what else is animated on it.
+        bones: "location", ... -> float32[N, bones, width] of the deforming armature's bones without
+            the evaluator; None if nothing animates them.
+        others: id -> {(path, first index): list of values} of other animated properties.
     """
 
     frames: NDArray[np.float64]
@@ -64,16 +64,16 @@ def sample(
     frames: NDArray[np.float64],
     keys: Sequence[tuple[MeshObject, list[str]]] = (),
 ) -> Generator[float, None, list[Samples]]:
-    """Read the inputs of faces over a range; a generator, so that it can show progress and end.
+    """Read the inputs of faces over a range; a generator that shows progress and can be cancelled.
 
     Args:
-        context: its scene gives the frame rate; it is stepped itself only where it must be.
+        context: its scene gives the frame rate; the scene itself is stepped only if necessary.
         rigs: deforming armatures.
         frames: float64[N].
-        keys: (mesh object, data paths) whose shape keys are animated by more than the face.
+        keys: (mesh object, data paths) of shape keys that have animation of their own.
 
     Yields:
-        The share that is done, 0 to 1.
+        The finished share, 0 to 1.
 
     Returns:
         The Samples of each rig, in order.
@@ -146,8 +146,8 @@ def _is_there(scene: bpy.types.Scene) -> bool:
 
 
 def _needs_whole_scene(scene: bpy.types.Scene, rigs: Iterable[ArmatureObject]) -> bool:
-    """Whether something asks for the scene itself: simulated bodies, drivers by context, and what
-    is hidden everywhere, which Blender evaluates only for what is seen with it.
+    """Whether the scene itself must be stepped: for simulated bodies, drivers by context, and
+    hidden objects, which Blender evaluates only for visible objects.
     """
     if scene.rigidbody_world is not None:
         return True
@@ -189,7 +189,8 @@ class _Reader:
         self.objects = [self.controls, rig, *(item for item, _paths in keys)]
         hold = rig_placement.body_of(self.controls)
         if hold is not None:
-            # All of its bones: of what nothing visible depends on Blender evaluates nothing.
+            # Hold all of its bones: Blender does not evaluate bones that no visible object depends
+            # on.
             self.objects.append(hold.target)
         if drivers.moves(rig):
             size = len(rig.pose.bones)
@@ -234,11 +235,12 @@ class _Reader:
         raw: NDArray[np.float32],
         own: layer_mixing.Bones,
     ) -> Iterator[None]:
-        """While this lasts constraints on the joints of neck and head see the turns of this frame.
+        """Context manager: constraints on the joints of neck and head see the rotations of this
+        frame.
 
         Args:
             depsgraph: at the frame; it is evaluated once more.
-            raw, own: as of inputs.read_mixed.
+            raw, own: see inputs.read_mixed.
         """
         if not joint_readings.of(self.rig, self.live).places:
             yield
@@ -290,7 +292,7 @@ class _Reader:
 
 
 def _value(owner: bpy.types.ID, path: str) -> list[float] | None:
-    """The numbers at a path, or None where it leads nowhere or to words."""
+    """The numbers at a path; None if it leads to nothing or to text."""
     try:
         value = owner.path_resolve(path)
     except ValueError:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the parts of a character are found and kept, and what differs between Blenders."""
+"""Finding and storing the parts of a character, and differences between Blender versions."""

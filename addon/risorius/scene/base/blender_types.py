@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A checker sees members of a Context that are there; Blender's own may be None:
-# pyright: reportIncompatibleMethodOverride=false
-"""Names for annotations where Blender's own say too little.
+# A checker treats members of this Context as present; Blender's own may be None: pyright:
+# reportIncompatibleMethodOverride=false
+"""Types for annotations that are more exact than Blender's own.
 
-Objects by what they hold: Blender's own class may hold data of any kind. The stubs of Blender's API
-leave open whether a context has a scene or a window manager: it has while an operator runs or a
-panel is drawn, and a checker shall not ask for it each time. While the add-on runs all classes here
-are Blender's own. What is Any here is so because the base class lacks what its kinds have: nothing
-else in the add-on may have Any in what it takes or gives.
+An Object type for each kind of data: Blender's class may have data of any kind. In the stubs of
+    Blender's API a context may lack a scene or a window manager. It has both while an operator runs
+    or a panel is drawn, so code need not test it each time. At run time all classes here are
+    Blender's own. Any is used here because a base class lacks the members of its kinds. No other
+    file of the add-on may use Any in a signature.
 """
 
 from __future__ import annotations
@@ -67,9 +67,9 @@ if TYPE_CHECKING:
         risorius_live: bpy.types.PropertyGroup
 
     class Context(bpy.types.Context):
-        """What an operator or a panel works on.
+        """The context of an operator or a panel.
 
-        In the stubs a member named property makes methods of all members above it.
+        In the stubs a member named property turns all members above it into methods.
         """
 
         region: bpy.types.Region | None  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -100,5 +100,5 @@ else:
 
 
 def current_context() -> Context:
-    """What bpy.context is now."""
+    """The current bpy.context."""
     return cast(Context, bpy.context)

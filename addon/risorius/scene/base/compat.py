@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What differs between Blender 4.2 and 5.2."""
+"""Differences between Blender 4.2 and 5.2."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NEWEST_TRIED = (5, 2)  # of Blender, by packaging/check/blender/matrix.sh
 
 
 def notice() -> str:
-    """A sentence where this Blender is newer than all that Risorius was tried with, else empty."""
+    """A sentence if this Blender is newer than all tested versions, else empty."""
     if bpy.app.version[:2] <= NEWEST_TRIED:
         return ""
     return told(
@@ -27,7 +27,7 @@ def notice() -> str:
 
 
 def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
-    """The F-curves of an action: since 4.4 it has layers and slots, since 5.0 nothing else."""
+    """The F-curves of an action: since 4.4 it has layers and slots, since 5.0 only these."""
     if hasattr(action, "layers") and len(action.layers):
         for layer in action.layers:
             for strip in layer.strips:
@@ -38,7 +38,7 @@ def curves_of(action: bpy.types.Action) -> Iterator[bpy.types.FCurve]:
 
 
 def _strips(layer: bpy.types.ActionLayer) -> list[bpy.types.ActionKeyframeStrip]:
-    """The strips of a layer of an action: there is only one kind of them."""
+    """The strips of a layer of an action: Blender has only one kind."""
     return cast("list[bpy.types.ActionKeyframeStrip]", layer.strips)
 
 
@@ -60,15 +60,15 @@ def driver_of(curve: bpy.types.FCurve) -> bpy.types.Driver:
 
 
 def uid_of(modifier: bpy.types.Modifier) -> int:
-    """What tells a modifier from the others of its object, also after it was renamed.
+    """A number that identifies a modifier of an object, also after renaming.
 
-    0 in a Blender that does not say it.
+    0 in a Blender without such a number.
     """
     return int(getattr(modifier, "persistent_uid", 0))
 
 
 def _selecting(bone: bpy.types.PoseBone) -> bpy.types.Bone:
-    """What says whether a bone is selected: since 5.0 the pose bone."""
+    """The object that stores the selection of a bone: since 5.0 the pose bone."""
     return cast("bpy.types.Bone", bone) if hasattr(bone, "select") else bone.bone
 
 
@@ -82,7 +82,7 @@ def select_bone(bone: bpy.types.PoseBone, chosen: bool = True) -> None:
 
     Args:
         bone: the pose bone.
-        chosen: select it, else take it out of the selection.
+        chosen: True: select; False: deselect.
     """
     _selecting(bone).select = chosen
 
@@ -90,8 +90,8 @@ def select_bone(bone: bpy.types.PoseBone, chosen: bool = True) -> None:
 def deselect_all(layer: bpy.types.ViewLayer) -> None:
     """Select no object of a view layer.
 
-    4.2 walks its list of objects while selecting makes it anew, and dies where objects have come
-    or gone since the last update.
+    4.2 iterates its list of objects while selecting rebuilds the list, and crashes if objects were
+    added or removed since the last update.
     """
     layer.update()
     for item in layer.objects[:]:
@@ -99,14 +99,14 @@ def deselect_all(layer: bpy.types.ViewLayer) -> None:
 
 
 def add_curves(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChannelbag:
-    """Where new F-curves of an action go.
+    """The collection for new F-curves of an action.
 
     Args:
         action: a new action.
         owner: the datablock that it moves.
 
     Returns:
-        What has `fcurves` and `groups`: since 4.4 the bag of a slot.
+        An object with `fcurves` and `groups`: since 4.4 the channel bag of a slot.
     """
     if not hasattr(action, "slots"):
         return cast("bpy.types.ActionChannelbag", action)
@@ -116,13 +116,13 @@ def add_curves(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionCha
 
 
 def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot | None:
-    """The slot of an action that fits a datablock, or None: before 4.4, and where none fits.
+    """The slot of an action that fits a datablock, or None: before 4.4, and if none fits.
 
-    The one that it plays, else the one of its name, else the first of its kind.
+    First choice is the slot in use, then the slot of its name, then the first of its kind.
 
     Args:
         action: any action.
-        owner: the object or the shape keys that play it or shall play it.
+        owner: the object or the shape keys that play it or will play it.
     """
     kinds = (owner.id_type, "UNSPECIFIED")
     slots = [s for s in getattr(action, "slots", ()) if s.target_id_type in kinds]
@@ -135,10 +135,10 @@ def slot_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionSlot 
 
 
 def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChannelbag | None:
-    """What holds the F-curves by which an action moves a datablock, or None where there is none.
+    """The channel bag with the F-curves of an action for a datablock, or None.
 
     Args:
-        action: as one makes them, with one layer of one strip; before 4.4 it is given itself.
+        action: an action with one layer of one strip; before 4.4 the action itself is returned.
         owner: the object or the shape keys; decides on the slot.
     """
     if not hasattr(action, "slots") or not len(action.layers):
@@ -150,7 +150,7 @@ def bag_for(action: bpy.types.Action, owner: Animated) -> bpy.types.ActionChanne
 
 
 def curves_for(action: bpy.types.Action, owner: Animated) -> list[bpy.types.FCurve]:
-    """The F-curves by which an action moves a datablock: of one slot, where it has slots.
+    """The F-curves of an action for a datablock: of one slot, if the action has slots.
 
     Args:
         action: any action.
@@ -175,7 +175,7 @@ def played_actions(owner: Animated) -> list[bpy.types.Action]:
 
 
 def actions_in(strips: Iterable[bpy.types.NlaStrip]) -> Iterator[bpy.types.Action]:
-    """The actions of NLA strips and of those inside meta strips."""
+    """The actions of NLA strips, also inside meta strips."""
     for strip in strips:
         if strip.action is not None:
             yield strip.action
@@ -192,7 +192,7 @@ def assign_action(
     Args:
         target: the animation data or the strip.
         action: any action.
-        slot: of the action; None leaves the choice to Blender, and is all there is before 4.4.
+        slot: of the action; None lets Blender choose. Before 4.4 it is always None.
     """
     target.action = action
     if slot is not None:
@@ -200,6 +200,6 @@ def assign_action(
 
 
 def strips_of(scene: bpy.types.Scene) -> bpy.types.StripsTopLevel:
-    """The strips of a scene's sequencer, which is made where there is none."""
+    """The strips of a scene's sequencer, which is created if missing."""
     editor = scene.sequence_editor or scene.sequence_editor_create()
     return editor.strips if hasattr(editor, "strips") else editor.sequences

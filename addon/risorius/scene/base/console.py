@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the console is told: our own sentences, and none of Blender's while it works for us."""
+"""Output to the console: our own sentences, without Blender's messages from our calls."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def say(*sentences: str) -> None:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Drop what operators write to the standard output; errors have their own way.
+    """Discard the standard output of operators; errors go to the standard error.
 
-    Without a window a bake tells every step of the renderer, from C; with one it tells none.
+    Without a window the renderer prints every step of a bake from C.
     """
     with redirect_stdout(io.StringIO()):
         if not bpy.app.background:
@@ -37,7 +37,7 @@ def quiet() -> Iterator[None]:
 
 
 def _turn_away() -> int | None:
-    """Let the standard output go nowhere; returns what it was, None where there is none."""
+    """Discard the standard output. Returns: its earlier file descriptor, or None."""
     with suppress(OSError):  # closed, as in a service
         kept = os.dup(1)
         nowhere = os.open(os.devnull, os.O_WRONLY)

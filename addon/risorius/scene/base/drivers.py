@@ -14,7 +14,7 @@ from .blender_types import ArmatureObject
 
 _ENTRY = re.compile(r'^\["(channels|maps)"\]\[(\d+)\]$')
 _GONE = re.compile(r'^\["(gone (channels|maps): .*)"\]$')
-# What has a node tree of its own inside; a scene has one up to Blender 4.5.
+# Datablocks with a node tree inside; scenes have one up to Blender 4.5.
 _WITH_NODES = (
     bpy.types.Material,
     bpy.types.World,
@@ -100,7 +100,7 @@ class Entries:
         return f'["{bpy.utils.escape_identifier(key)}"]'
 
     def move(self) -> None:
-        """Point the drivers at their new places; what they read must have been evaluated."""
+        """Point the drivers at their new places; their targets must be evaluated before."""
         for target, path in self._moves:
             target.data_path = path
 
@@ -120,7 +120,7 @@ def moves(owner: bpy.types.Object) -> bool:
 
 
 def used_controls(controls: ArmatureObject, labels: Sequence[str]) -> set[str]:
-    """Those control properties that an F-curve of any action or a driver uses.
+    """The control properties that an F-curve of any action or a driver uses.
 
     Args:
         controls: control armature.
@@ -145,8 +145,8 @@ def plain_driver(
     """Make an F-curve follow one property of an object, without any expression.
 
     Args:
-        curve: of a new driver that has no variables.
-        owner: the object that has the property.
+        curve: of a new driver without variables.
+        owner: the object with the property.
         data_path: from the object to one number.
         name: of the driver's variable.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The form of what a character saves in a .blend, as a number on its control armature."""
+"""The form of a character's saved data in a .blend, as a number on its control armature."""
 
 from __future__ import annotations
 

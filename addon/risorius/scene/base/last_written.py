@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What was last written to the objects of characters: what is unchanged is not written again.
+"""The last values written to objects of characters; unchanged values are not written again.
 
-All of it is keyed by session uids, so that no Blender object is kept.
+Keys are session uids, so that no Blender object is kept.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import bpy
 
 from . import session
 
-# Deforming armature -> what its face was last evaluated from.
+# Deforming armature -> inputs of the last evaluation of its face.
 inputs: dict[int, object] = session.table("last_written.inputs", ("rewrite", "undo", "load"))
 # Deforming armature -> bytes of the matrix that was last written.
 places: dict[int, object] = session.table("last_written.places", ("rewrite", "undo", "load"))
@@ -20,12 +20,12 @@ weights: dict[int, object] = session.table("last_written.weights", ("rewrite", "
 bone_writers: dict[int, object] = session.table(
     "last_written.bone_writers", ("rewrite", "undo", "load")
 )
-# Deforming armature -> the Reading of frame/joint_readings.py, until the file is edited. Undo
-# keeps it: it knows what the console was told.
+# Deforming armature -> the Reading of frame/joint_readings.py, until the file is edited. Undo keeps
+# it, because it remembers messages on the console.
 readings: dict[int, object] = session.table("last_written.readings", ("load",))
-# Shape keys whose points were last written without an update.
+# Shape keys whose points were last written without notifying Blender.
 unheard: set[int] = session.keep("last_written.unheard", set, ("rewrite", "undo", "load"))
-# Objects of overrides that Blender lets nobody write to.
+# Objects of overrides that Blender does not let anyone write to.
 _refused: set[int] = session.keep("last_written.refused", set, ("rewrite", "undo", "load"))
 
 
@@ -44,11 +44,11 @@ def is_new(kept: dict[int, object], item: bpy.types.ID, state: object) -> bool:
 
 
 def note_refusal(item: bpy.types.ID, taken: bool) -> None:
-    """Note whether Blender took what was written to an object: it refuses without a word.
+    """Note whether Blender accepted a write to an object; it refuses silently.
 
     Args:
         item: the object.
-        taken: whether it has now what was written.
+        taken: whether the object has the written value.
     """
     if taken:
         _refused.discard(item.session_uid)
@@ -57,7 +57,7 @@ def note_refusal(item: bpy.types.ID, taken: bool) -> None:
 
 
 def is_refused(item: bpy.types.ID) -> bool:
-    """Whether Blender refused what was last written to an object."""
+    """Whether Blender refused the last write to an object."""
     return item.session_uid in _refused
 
 

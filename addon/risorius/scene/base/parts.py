@@ -69,10 +69,10 @@ _MOST_MESHES = 1 << 16  # the numbers of a DNA file have 16 bits
 
 
 def rigs(linked: bool = False) -> list[ArmatureObject]:
-    """The deforming armatures of all characters of this file; linked ones are not written.
+    """The deforming armatures of all characters of this file; linked ones cannot be written.
 
     Args:
-        linked: also those of other files.
+        linked: include linked armatures.
     """
     return [o for o in bpy.data.objects if (linked or o.library is None) and is_rig(o)]
 
@@ -97,7 +97,7 @@ def point(owner: bpy.types.Object, key: str, item: bpy.types.ID) -> None:
 
 
 def controls_of(rig: ArmatureObject) -> ArmatureObject | None:
-    """The control armature of a character, or None where it was deleted."""
+    """The control armature of a character, or None if it was deleted."""
     controls = cast("ArmatureObject | None", saved.item(rig, CONTROLS))
     if controls is None or controls.type != "ARMATURE" or FACE not in controls.pose.bones:
         return None
@@ -119,7 +119,7 @@ def keys_there(item: MeshObject) -> bpy.types.Key:
 
 
 def carrier_of(rig: ArmatureObject) -> bpy.types.Object:
-    """The object whose array MAPS the drivers of a character's materials read.
+    """The object with the array MAPS that drivers of a character's materials read.
 
     It is a mesh of the character: each update of the deforming armature copies all its bones.
     Characters of older files have the array on the deforming armature alone.
@@ -142,10 +142,10 @@ def rig_of(item: bpy.types.Object | None) -> ArmatureObject | None:
 
 
 def title_of(rig: ArmatureObject) -> str:
-    """The name of a character: two of them have two names.
+    """The unique name of a character.
 
     Args:
-        rig: its deforming armature, whose copies are called Anna_rig.001.
+        rig: its deforming armature; copies are called Anna_rig.001 and so on.
     """
     name, mark, number = rig.name.rpartition("_rig")
     return name + number if mark else rig.name
@@ -157,13 +157,14 @@ def maximum_of(controls: ArmatureObject) -> float:
 
 
 def members_of(rig: ArmatureObject) -> list[bpy.types.Object]:
-    """All objects of a character that are there: rig, controls, meshes; also of a ruin."""
+    """All existing objects of a character: rig, controls, meshes; also of an incomplete
+    character."""
     held = (rig, saved.item(rig, CONTROLS), *meshes_of(rig))
     return [item for item in held if item is not None]
 
 
 def meshes_of(rig: ArmatureObject) -> list[MeshObject]:
-    """The mesh objects of a character; what points to another character is not among them."""
+    """The mesh objects of a character; meshes that point to another character are left out."""
     found = []
     for key in rig.keys():  # noqa: SIM118  Blender's ID is no dict
         if key.startswith(MESH_PREFIX):
@@ -174,7 +175,7 @@ def meshes_of(rig: ArmatureObject) -> list[MeshObject]:
 
 
 def is_numbered(item: bpy.types.Object) -> TypeGuard[MeshObject]:
-    """Whether an object is a mesh that says which one of its DNA it is."""
+    """Whether an object is a mesh that stores its mesh index in the DNA file."""
     number = item.get(MESH)
     return item.type == "MESH" and isinstance(number, int) and 0 <= number < _MOST_MESHES
 
@@ -187,9 +188,9 @@ def meshes_pointing_at(rig: ArmatureObject) -> list[MeshObject]:
 
 
 def active_rig(context: Context) -> ArmatureObject | None:
-    """The character of the active object, else the only one of the scene, else None.
+    """The character of the active object, or the only one of the scene, or None.
 
-    Never a linked one: nothing on it can be changed.
+    Linked characters are left out, because they cannot be changed.
     """
     rig = rig_of(context.object)
     if rig is None:
@@ -200,7 +201,7 @@ def active_rig(context: Context) -> ArmatureObject | None:
 
 
 def face_bone(rig: ArmatureObject) -> bpy.types.PoseBone | None:
-    """The pose bone that bears the control properties, or None."""
+    """The pose bone with the control properties, or None."""
     controls = controls_of(rig)
     return controls.pose.bones[FACE] if controls else None
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Custom properties of a .blend, which may hold anything: words, no number, numbers of any size.
+"""Reading custom properties of a .blend, whose values may have any type and size.
 
-What is of another kind or out of range counts as if it was not there. Tables and arrays are copied:
-they point into Blender's memory, which is freed when the property goes.
+A value of another type or out of range counts as missing. Tables and arrays are copied, because
+they point into Blender's memory, which is freed with the property.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ def whole(owner: Owner, key: str, default: int, low: int = -_MOST, high: int = _
     """A whole number.
 
     Args:
-        owner: what has the property.
+        owner: the datablock or bone with the property.
         key: its name.
-        default: where there is none within the range.
-        low, high: the range, with its ends.
+        default: returned if the value is missing or out of range.
+        low, high: the range, ends included.
     """
     found = owner.get(key)
     if isinstance(found, float) and found.is_integer():
@@ -60,7 +60,7 @@ def wholes(owner: Owner, key: str, low: int = -_MOST, high: int = _MOST) -> list
     """The whole numbers of a list that are in a range.
 
     Args:
-        owner, key, low, high: as for `whole`.
+        owner, key, low, high: see `whole`.
     """
     return [n for n in _entries(owner, key) if type(n) is int and low <= n <= high]
 
@@ -69,7 +69,7 @@ def numbers(owner: Owner, key: str, low: float = -math.inf, high: float = math.i
     """The finite numbers of a list that are in a range.
 
     Args:
-        owner, key, low, high: as for `whole`.
+        owner, key, low, high: see `whole`.
     """
     found = [float(n) for n in _entries(owner, key) if isinstance(n, int | float)]
     return [n for n in found if math.isfinite(n) and low <= n <= high]
@@ -81,7 +81,7 @@ def texts(owner: Owner, key: str) -> list[str]:
 
 
 def table(owner: Owner, key: str) -> Mapping[str, object] | None:
-    """A copy of a table, or None where there is none. Args: owner, key  as for `whole`."""
+    """A copy of a table, or None. Args: owner, key see `whole`."""
     found = owner.get(key)
     return (
         cast("dict[str, object]", found.to_dict()) if isinstance(found, IDPropertyGroup) else None
@@ -95,7 +95,7 @@ def item(owner: Owner, key: str) -> bpy.types.Object | None:
 
 
 def length(owner: Owner, key: str) -> int:
-    """How many numbers an array has; 0 where there is none. Args: owner, key  as for `whole`."""
+    """The length of an array; 0 if it is missing. Args: owner, key see `whole`."""
     found = owner.get(key)
     return len(cast("list[float]", found)) if isinstance(found, IDPropertyArray) else 0
 

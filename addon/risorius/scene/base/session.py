@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one owner of everything that the add-on remembers between two calls.
+"""The owner of all values that the add-on keeps between two calls.
 
-A module that remembers something takes its table here and says by words when the table ends. The
-handlers name the event, and all tables that end with it are emptied in place: a module holds its
-table in a name of its own and reads it as fast as any other dict. A test of tests/layers finds
-every other object of a module or class that changes.
+A module gets its table here and names the events that empty it. The handlers report an event, and
+all tables of this event are emptied in place. A module keeps its table in a variable and reads it
+as fast as any dict. A test in tests/layers finds every other changing object of a module or class.
 """
 
 from __future__ import annotations
@@ -20,11 +19,10 @@ from collections.abc import (
 from functools import lru_cache
 from typing import Generic, Literal, Protocol, TypeVar, cast, get_args
 
-# free: before undo, redo and load, which free what Blender's pointers point to.
-# undo: after undo and redo. load: after a file was loaded. frame: before a frame is evaluated.
-# rewrite: what was written is to be written anew, whatever is there.
-# unregister: ends all but what has the word quit, which ends with Blender: work of the user's, and
-# what is read from the extension's own files.
+# free: before undo, redo and load, which free what Blender's pointers point to. undo: after undo
+# and redo. load: after a file was loaded. frame: before a frame is evaluated. rewrite: all values
+# must be written again. unregister: empties all tables except those with quit. These end with
+# Blender: work of the user, and data read from the extension's own files.
 End = Literal["free", "undo", "load", "frame", "rewrite", "unregister", "quit"]
 
 Kept = TypeVar("Kept")
@@ -41,7 +39,7 @@ class Cached(Protocol):
 
 
 class Slot(Generic[Kept]):
-    """One value. Attributes: now  what it is; it is assigned anew."""
+    """One value. Attributes: now the current value, which code replaces."""
 
     __slots__ = ("now",)
 
@@ -50,7 +48,8 @@ class Slot(Generic[Kept]):
 
 
 class _Entry:
-    """Attributes: ends  words; clear  begins anew; is_new  whether it is as at the beginning."""
+    """Attributes: ends events; clear restores the initial state; is_new whether it has that
+    state."""
 
     def __init__(
         self, ends: Sequence[End], clear: Callable[[], object], is_new: Callable[[], bool]
@@ -69,27 +68,27 @@ _by_end: dict[str, list[_Entry]] = {}  # what a frame asks must be there already
 def table(  # its types are those of the name that it is assigned to
     name: str, ends: Sequence[End]
 ) -> dict[Key, Value]:  # pyright: ignore[reportInvalidTypeVarUse]
-    """A dict that is emptied when it ends.
+    """A dict that events empty.
 
     Args:
-        name: says what it has; no other entry is called so.
-        ends: the words of the events that end it; `unregister` does in any case but `quit`.
+        name: unique name of its content.
+        ends: events that empty it; `unregister` always does, except with `quit`.
 
     Returns:
-        The dict, which stays the same one.
+        The dict; it stays the same object.
     """
     return keep(name, dict, ends)
 
 
 def keep(name: str, make: Callable[[], Kept], ends: Sequence[End]) -> Kept:
-    """A dict, set, list, deque, weak dictionary or record that begins anew when it ends.
+    """A dict, set, list, deque, weak dictionary or record that events reset.
 
     Args:
         name, ends: see `table`.
-        make: makes one as it is at the beginning. A record is a class without slots.
+        make: makes the initial object. A record is a class without slots.
 
     Returns:
-        One that make made, which stays the same.
+        The object of `make`; it stays the same object.
     """
     kept = make()
     empty = isinstance(kept, Sized) and not len(kept)
@@ -104,7 +103,7 @@ def value(name: str, start: Kept, ends: Sequence[End]) -> Slot[Kept]:
 
     Args:
         name, ends: see `table`.
-        start: what it is at the beginning and after each end; nobody changes it in place.
+        start: initial value, also after each event; it is never changed in place.
 
     Returns:
         Slot.
@@ -119,11 +118,11 @@ def value(name: str, start: Kept, ends: Sequence[End]) -> Slot[Kept]:
 
 
 def cached(ends: Sequence[End], most: int = 128) -> Callable[[Function], Function]:
-    """Decorator: keep what a function returned by what it was given.
+    """Decorator: cache results of a function by its arguments.
 
     Args:
         ends: see `table`.
-        most: results that are kept; the oldest go.
+        most: most results to keep; the oldest are dropped.
     """
 
     def decorate(function: Function) -> Function:
@@ -135,7 +134,7 @@ def cached(ends: Sequence[End], most: int = 128) -> Callable[[Function], Functio
 
 
 def adopt(ends: Sequence[End], *functions: Callable[..., object]) -> None:
-    """Own the caches of functions whose modules know no session.
+    """Own the caches of functions in modules that do not use the session.
 
     Args:
         ends: see `table`.
@@ -146,7 +145,7 @@ def adopt(ends: Sequence[End], *functions: Callable[..., object]) -> None:
 
 
 def at(*ends: End) -> Callable[[Function], Function]:
-    """Decorator: call a function without arguments when something ends, to give back what it holds.
+    """Decorator: call a function without arguments at events, to release its resources.
 
     Args:
         ends: see `table`.
@@ -160,7 +159,7 @@ def at(*ends: End) -> Callable[[Function], Function]:
 
 
 def end(word: End) -> None:
-    """Begin everything anew that ends with an event. Args: word  the event."""
+    """Reset everything that ends with an event. Args: word the event."""
     for entry in _by_end.get(word, ()):
         entry.clear()
 
@@ -195,7 +194,7 @@ def _name(function: object) -> str:
 
 
 def _refill(kept: object, fresh: object) -> None:
-    """Make an object again what a fresh one is."""
+    """Give an object the content of a fresh one."""
     if isinstance(kept, MutableMapping):
         kept.clear()
         kept.update(cast("MutableMapping[object, object]", fresh))

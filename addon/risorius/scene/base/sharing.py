@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What equal characters hold once in a .blend: the Texts of their files, their packed images.
+"""Sharing of equal data between characters of a .blend: Texts of DNA files, packed images.
 
-An image is shared until somebody edits it, by whatever tool: then the others are given one as it
-was. Meshes and shape keys are never shared, because the values of keys belong to one face alone.
+An image is shared until any tool edits it. Then the other characters get a copy of the unedited
+image. Meshes and shape keys are never shared, because the values of keys belong to one face.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _kept: dict[str, bytes] = session.table("sharing.kept", ("unregister",))
 
 
 def mark(image: bpy.types.Image, digest: str = "") -> None:
-    """Remember what is packed in an image, so that it may be shared from now on.
+    """Store the hash of an image's packed bytes, so that the image can be shared.
 
     Args:
-        image: nothing is remembered of one that is not packed.
-        digest: storage.hash_of what is packed, where it is known.
+        image: images without packed bytes are ignored.
+        digest: storage.hash_of the packed bytes, if known.
     """
     content = _packed(image)
     if content is not None:
@@ -35,12 +35,12 @@ def mark(image: bpy.types.Image, digest: str = "") -> None:
 
 
 def find(content: bytes, digest: str, data: bool) -> bpy.types.Image | None:
-    """An image of this .blend that holds these bytes and was not edited, or None.
+    """An unedited image of this .blend with these bytes, or None.
 
     Args:
         content: bytes of an image file.
-        digest: storage.hash_of them.
-        data: whether it is read as numbers, not as colours.
+        digest: storage.hash_of the content.
+        data: True: read as numbers; False: read as colours.
     """
     for image in bpy.data.images:
         if image.get(DIGEST) != digest or image.library is not None or _edited(image):
@@ -61,7 +61,7 @@ def nodes_of(rig: ArmatureObject) -> Iterator[Node]:
 
 
 def keep() -> None:
-    """Hold the bytes of the images that several characters show: what is edited is lost else."""
+    """Keep the bytes of shared images in memory, because an edit would lose them."""
     owned = _owners(parts.rigs()).items()
     shown = {_noted(image)[0]: image for image, owners in owned if len(owners) > 1}
     for digest in [d for d in _kept if d not in shown]:
@@ -73,16 +73,16 @@ def keep() -> None:
 
 
 def separate(exact: bool = False, spaces: bool = True) -> list[str]:
-    """Give characters an image as it was, where one that they share with another was edited.
+    """Give characters a copy of the unedited image, if a shared image was edited.
 
-    The edited one stays with the active character.
+    The edited image stays with the active character.
 
     Args:
-        exact: look at what is packed as well, as is done before a save.
-        spaces: look at colour spaces as well: asking Blender for one takes 9 us, all else 2.
+        exact: compare packed bytes too, as before a save.
+        spaces: compare colour spaces too: reading one takes 9 us, all other checks 2 us.
 
     Returns:
-        Sentences on what was changed.
+        Sentences about changes.
     """
     ours = [i for i in bpy.data.images if DIGEST in i and i.library is None]
     edited = [i for i in ours if _edited(i, spaces) or (exact and i.users > 1 and not _is_whole(i))]
@@ -93,10 +93,10 @@ def separate(exact: bool = False, spaces: bool = True) -> list[str]:
 
 
 def share() -> list[str]:
-    """Before a save: what equal characters hold is held once; an edited image is its own again.
+    """Before a save: share equal data of characters, and separate edited images.
 
     Returns:
-        Sentences on what was changed.
+        Sentences about changes.
     """
     rigs = parts.rigs()
     done = separate(exact=True)
@@ -169,9 +169,9 @@ def _separate(image: bpy.types.Image, owners: Sequence[ArmatureObject]) -> list[
 
 
 def _image_of(content: bytes, image: bpy.types.Image, state: str) -> bpy.types.Image:
-    """A new image of packed bytes, with the settings that another had as its state was noted.
+    """A new image of packed bytes, with the stored settings of another image.
 
-    What is noted may be any text; where it names no setting, the other's present ones are taken.
+    The stored text may be invalid; then the current settings of the other image are used.
     """
     space, alpha = (*state.split("\n"), "")[:2]
     fresh = bpy.data.images.new(image.name, 1, 1)
@@ -223,7 +223,7 @@ def _packed(image: bpy.types.Image) -> bytes | None:
 
 
 def _is_whole(image: bpy.types.Image, digest: str | None = None) -> bool:
-    """Whether what is packed is what was marked."""
+    """Whether the packed bytes of an image have the marked hash."""
     content = _packed(image)
     wanted = _noted(image)[0] if digest is None else digest
     return content is not None and storage.hash_of(content) == wanted

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Control armatures evaluated alone, in a scene of data of its own.
 
-That scene is in no file: no list, save, undo step, append or handler finds it. It has the armatures
-as cameras of its markers: those are evaluated and get no user by it. What else is evaluated there
-is what moves them, and Blender finds that itself.
+This scene is in no file: no list, save, undo step, append or handler finds it. The armatures are
+    cameras of its markers: Blender evaluates these and counts no user. Blender finds the objects
+    that move them by itself.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ class Stage:
     """A scene in data of its own.
 
     Args:
-        roots: what is evaluated.
+        roots: objects to evaluate.
     """
 
     def __init__(self, roots: Sequence[bpy.types.Object]) -> None:
         data = bpy.data.temp_data()  # which the stubs take for what it gives
         self._data = cast("AbstractContextManager[bpy.types.BlendData]", data)
         self._file = self._data.__enter__()
-        # Ours, that of what gave it, and the one that is asked here are three.
+        # Three references are expected: ours, the creator's, and the argument of this call.
         if bpy.app.version[:2] <= MISCOUNTED_UNTIL or sys.getrefcount(self._file) < 3:
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._file))
         self._scene = self._file.scenes.new("Risorius")
@@ -103,7 +103,8 @@ def alone(armatures: Iterable[ArmatureObject]) -> Iterator[None]:
 
 @contextmanager
 def unheard() -> Iterator[None]:
-    """While this lasts no handler is told of a frame or an update: it is none of the user's."""
+    """Context manager: no handler is called for frames and updates, because these are not the
+    user's."""
     lists = [getattr(bpy.app.handlers, name) for name in _HANDLERS]
     kept = [handlers[:] for handlers in lists]
     for handlers in lists:
@@ -116,7 +117,7 @@ def unheard() -> Iterator[None]:
 
 
 def identity(items: Iterable[bpy.types.Object]) -> tuple[tuple[int, int], ...]:
-    """What tells that objects are still those of before, without holding them."""
+    """Numbers that identify objects without holding references."""
     return tuple((item.session_uid, item.as_pointer()) for item in items)
 
 

@@ -19,8 +19,8 @@ from .blender_types import ArmatureObject
 _BYTES = "risorius_bytes"
 _HASH = "risorius_hash"
 _LENGTH = "risorius_length"  # of the unpacked file; Texts of older versions have none
-# Whatever a .blend says, what is unpacked is at most so many times what the .blend holds, and a
-# little more. DNA files pack to a half or a fifth; one that packs better is kept as it is.
+# Unpacked bytes are at most 32 times the packed bytes and 64 KB more, whatever a .blend states. DNA
+# files pack to a half or a fifth; a file that packs better is stored unpacked.
 _MOST_TIMES = 32
 _ALWAYS = 1 << 16  # bytes
 _PIECE = 1 << 20  # bytes
@@ -28,19 +28,20 @@ _SIGNATURE = b"DNA"  # what the first bytes of every DNA file are
 
 
 class ContentError(FaceError):
-    """What a Text holds is not the DNA file that was put there; the text goes on after a colon."""
+    """A Text does not have the stored DNA file. Its sentence continues after a colon."""
 
 
 def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text:
-    """Put the bytes of a file into a Text datablock: a new one, or that which has them already.
+    """Put the bytes of a file into a Text datablock: a new one, or an existing one with the same
+    bytes.
 
     Args:
         name: the character's name.
         content: bytes of the DNA file.
-        made: list that a new datablock is put on.
+        made: receives a new datablock.
 
     Returns:
-        The Text. Nothing ever writes into it again: characters of one file share it.
+        The Text. It is never written again, because characters of one file share it.
     """
     digest = hash_of(content)
     there = _holding(content, digest)
@@ -60,7 +61,7 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
 
 
 def _holding(wanted: bytes, digest: str) -> bpy.types.Text | None:
-    """A Text of this .blend that holds these bytes, unpacked and not believed; or None."""
+    """A Text of this .blend with these bytes, or None. Its bytes are unpacked and compared."""
     for text in bpy.data.texts:
         if text.library is None and content_hash(text) == digest and _holds(text, wanted):
             return text
@@ -78,7 +79,7 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
     """Whether two Texts hold the same packed bytes of a DNA file.
 
     Args:
-        one: a Text that holds a file.
+        one: a Text with a file.
         other: another, or the same Text.
     """
     return one == other or (
@@ -87,8 +88,8 @@ def same(one: bpy.types.Text, other: bpy.types.Text) -> bool:
 
 
 def _packed(content: bytes) -> bytes:
-    """The bytes of a file as a zlib stream, within the bound of those that are unpacked."""
-    # A sixth of the time of level 6 for 9 % more room: nobody waits for a file to shrink.
+    """The bytes of a file as a zlib stream, within the bound for unpacking."""
+    # Level 2 takes a sixth of the time of level 6 for 9 % more bytes.
     packed = zlib.compress(content, 2)
     return packed if len(content) <= _most(packed) else zlib.compress(content, 0)
 
@@ -98,27 +99,27 @@ def _most(packed: bytes) -> int:
 
 
 def hash_of(content: bytes) -> str:
-    """The hash of the bytes of a file, as it is kept beside them."""
+    """The hash of the bytes of a file, as stored beside them."""
     return hashlib.sha256(content).hexdigest()
 
 
 def content_hash(text: object) -> str:
-    """The hash of what a Text holds; empty where it holds no DNA or is no Text at all."""
+    """The hash of the DNA file in a Text; empty if it has none or is no Text."""
     digest = text.get(_HASH) if isinstance(text, bpy.types.Text) else None
     return digest if isinstance(digest, str) else ""
 
 
 def text_of(rig: ArmatureObject) -> bpy.types.Text | None:
-    """The Text that holds the file of a character. Args: rig  its deforming armature."""
+    """The Text with the DNA file of a character. Args: rig its deforming armature."""
     text = rig.get(parts.DNA)
     return text if isinstance(text, bpy.types.Text) else None
 
 
 def content(text: object) -> bytes:
-    """The bytes of the DNA file that a Text holds.
+    """The bytes of the DNA file in a Text.
 
     Raises:
-        ContentError: they were tampered with or damaged, or this is no Text.
+        ContentError: the bytes were changed or damaged, or this is no Text.
     """
     packed = text.get(_BYTES) if isinstance(text, bpy.types.Text) else None
     if not isinstance(text, bpy.types.Text) or not isinstance(packed, bytes):
@@ -130,7 +131,7 @@ def content(text: object) -> bytes:
 
 
 def _limit(text: bpy.types.Text, packed: bytes) -> int:
-    """The bytes that may be unpacked: what was said when they were packed, within the bound."""
+    """The bytes that may be unpacked: the stored size, within the bound."""
     said = text.get(_LENGTH)
     if said is None:
         return _most(packed)

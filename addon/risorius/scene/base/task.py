@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work beside Blender: in a thread that touches nothing of Blender's, with progress and an end."""
+"""Work in a thread beside Blender, with progress and cancel. It uses no Blender data."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Work = Callable[[Callable[[float], None], Callable[[], bool]], Result]
 def telling(
     progress: Callable[[float], None], cancelled: Callable[[], bool]
 ) -> Callable[[float], bool]:
-    """A progress for work that ends where it is told False.
+    """A progress function that returns False to cancel the work.
 
     Args:
-        progress: of a task's work.
-        cancelled: of the same.
+        progress: progress function of a task.
+        cancelled: cancel function of the task.
     """
 
     def tell(share: float) -> bool:
@@ -29,12 +29,12 @@ def telling(
 
 
 class Task(Generic[Result]):
-    """Something that takes seconds.
+    """Work that takes seconds.
 
     Attributes:
-        share: 0 to 1, how far it is.
-        result: what the work gave, when it is done.
-        error: what went wrong, or None.
+        share: finished share, 0 to 1.
+        result: result of finished work.
+        error: the error, or None.
     """
 
     def __init__(self, work: Work[Result]) -> None:

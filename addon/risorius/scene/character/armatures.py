@@ -55,12 +55,12 @@ def _edit_bones(
 def edit_armature(
     context: Context, data: bpy.types.Armature
 ) -> Iterator[bpy.types.ArmatureEditBones]:
-    """The edit bones of an armature that is in use, whether its objects are hidden or not.
+    """The edit bones of an armature in use, also if its objects are hidden.
 
-    A context manager; what is changed within it is kept.
+    A context manager; changes inside it are kept.
 
     Args:
-        context: its scene holds the helper object for the while.
+        context: its scene temporarily has a helper object.
         data: the armature.
     """
     workshop = bpy.data.collections.new("bones")
@@ -75,7 +75,7 @@ def edit_armature(
 
 @contextmanager
 def kept_selection(context: Context) -> Iterator[None]:
-    """Restore the active object, its mode and the selection after building beside them."""
+    """Context manager: restore the active object, its mode and the selection."""
     layer = context.view_layer
     active = layer.objects.active
     mode = active.mode if active is not None else "OBJECT"
@@ -94,11 +94,11 @@ def kept_selection(context: Context) -> Iterator[None]:
 
 
 def join_pose_mode(context: Context, item: ArmatureObject) -> None:
-    """Let an armature be in pose mode beside the active object, which is in it already.
+    """Put an armature into pose mode together with the active object.
 
     Args:
-        context: a Blender context, whose view layer has both.
-        item: the armature; where Blender refuses it stays as it is.
+        context: its view layer has both objects.
+        item: the armature; it stays as it is if Blender refuses.
     """
     layer = context.view_layer
     active, layer.objects.active = layer.objects.active, item
@@ -109,10 +109,10 @@ def join_pose_mode(context: Context, item: ArmatureObject) -> None:
 
 
 def enter_pose_mode(context: Context, item: ArmatureObject) -> None:
-    """Make an armature the active object, alone selected and in pose mode.
+    """Make an armature active, select it alone, and enter pose mode.
 
     Args:
-        context: a Blender context, in whose view layer the armature is visible.
+        context: its view layer shows the armature.
         item: the armature.
     """
     layer = context.view_layer
@@ -139,11 +139,11 @@ def build_rig(
     Args:
         context: a Blender context with a view layer.
         plan: the CharacterPlan.
-        made: list that every new datablock is put on.
-        workshop: a linked collection in which bones are edited.
+        made: receives every new datablock.
+        workshop: a linked collection for editing bones.
 
     Returns:
-        The armature object; each bone bears its DNA index.
+        The armature object; each bone stores its joint index.
     """
     data = bpy.data.armatures.new(f"{plan.name}_rig")
     made.append(data)
@@ -179,11 +179,11 @@ def build_rig(
 
 
 def pull_controls(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Let Blender evaluate the controls wherever the rig is, also where they are hidden.
+    """Make Blender evaluate the controls with the rig, also if they are hidden.
 
-    Without a dependency Blender leaves out what is hidden in viewport or render, and the face
-    would stand still there. The drivers read the bones, because Blender evaluates only those
-    components of a hidden object that something visible depends on.
+    Without a dependency Blender skips hidden objects in viewport and render, and the face would not
+    move. The drivers read the bones, because Blender evaluates only those components of a hidden
+    object that something visible depends on.
 
     Args:
         rig: the deforming armature.
@@ -234,7 +234,7 @@ def pull_more(rig: ArmatureObject, controls: ArmatureObject) -> None:
 
 
 def pull_less(rig: ArmatureObject, bones: Collection[str]) -> None:
-    """Let go of bones of the controls that are to be removed.
+    """Remove dependencies on control bones before these are deleted.
 
     Args:
         rig: the deforming armature.
@@ -316,7 +316,7 @@ def build_controls(
 
 
 def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
-    """Where the control bones stand: name -> (position, axis, length, parent)."""
+    """Places of the control bones: name -> (position, axis, length, parent)."""
     rest, anchors, size = plan.armature.rest, plan.anchors, plan.size
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     low, high = points.min(axis=0), points.max(axis=0)
@@ -347,7 +347,7 @@ def control_places(plan: plans.CharacterPlan) -> dict[str, BonePlace]:
 
 
 def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
-    """The room that the outlines stand around. Args: plan  of the face."""
+    """The extent of the face, for placing the outlines. Args: plan of the face."""
     points = np.concatenate([m.positions for m in plan.meshes]).astype(float)
     between = control_places(plan)["eyes"][0]
     middle, wide = _sides(points, between[2], plan.size)
@@ -357,7 +357,7 @@ def outline_room(plan: plans.CharacterPlan) -> bone_shapes.Room:
 def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[float, float]:
     """Middle and half width of a head at the height of its eyes: shoulders are lower."""
     near = np.abs(points[:, 2] - height) < 0.1 * size
-    # A face without skin at its eyes has the width of all of it.
+    # A face without skin near its eyes uses the width of the whole face.
     across = points[near if near.any() else slice(None), 0]
     return float(across.max() + across.min()) / 2, float(np.ptp(across)) / 2
 
@@ -365,7 +365,7 @@ def _sides(points: NDArray[np.float64], height: float, size: float) -> tuple[flo
 def add_properties(
     bone: bpy.types.PoseBone, controls: Iterable[plans.ControlPlan], maximum: float = 1.0
 ) -> None:
-    """Give a pose bone the float property of each slider: limits, default, words.
+    """Add the float property of each slider to a pose bone, with limits, default and tooltip.
 
     Args:
         bone: the bone of the face.

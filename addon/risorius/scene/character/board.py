@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face board of a character: what its bones ask for, and whether it or the sliders lead.
+"""The face board of a character: the values of its handles, and whether it or the sliders lead.
 
-A handle's place in its own axes is the value of its GUI control, wherever board, armature and face
-stand. What no GUI control leads to stays with the sliders. Of what moves a face one leads: all that
-reads or sets "the pose" asks here.
+The location of a handle in its own axes is the value of its GUI control, wherever board, armature
+and face stand. Raw controls without a GUI control keep their sliders. Either the board or the
+sliders lead: all code that reads or sets "the pose" asks here.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ Floats = NDArray[np.float32]
 
 @dataclass
 class _Places:
-    """Where the values of handles stand among the places of an armature's bones.
+    """Indices of handle values among the bone locations of an armature.
 
     Attributes:
-        names: of all its pose bones, in order; other names, other places.
-        live: whose handles they are.
-        at: int[n] indices into the flat float[bones, 3] of places.
+        names: names of all its pose bones, in order; other names need new indices.
+        live: Runtime of the handles.
+        at: int[n] indices into the flat float[bones, 3] of locations.
         gui: int[n] the GUI control of each.
-        low, high, unit: float32[n] how far it goes, and its value for one unit.
-        moved: handles that constraints of the user's move: their bone and their axes.
+        low, high, unit: float32[n] its range, and its value for one unit.
+        moved: handles moved by the user's constraints: bone and axes.
     """
 
     names: tuple[str, ...]
@@ -67,7 +67,7 @@ def _handles_there(controls: ArmatureObject, live: runtime.Runtime) -> list[boar
 
 
 def is_there(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
-    """Whether a character has a face board, or something of it.
+    """Whether a character has a face board, complete or in part.
 
     Args:
         controls: its control armature.
@@ -78,7 +78,7 @@ def is_there(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
 
 
 def missing(controls: ArmatureObject, live: runtime.Runtime) -> list[str]:
-    """The handles that a board has lost; all of them where there is no board is none.
+    """The missing handles of a board; empty without a board.
 
     Args:
         controls: control armature of the character.
@@ -90,7 +90,7 @@ def missing(controls: ArmatureObject, live: runtime.Runtime) -> list[str]:
 
 
 def leads(controls: ArmatureObject, live: runtime.Runtime | None) -> bool:
-    """Whether the face board moves a face, else its sliders do.
+    """Whether the face board leads a face, and not its sliders.
 
     Args:
         controls: its control armature, the original one.
@@ -107,11 +107,11 @@ def leads_face(rig: ArmatureObject) -> bool:
 
 
 def set_lead(controls: ArmatureObject, by_board: bool) -> None:
-    """Choose what moves a face; its pose is not converted.
+    """Choose whether board or sliders lead, without converting the pose.
 
     Args:
         controls: its control armature.
-        by_board: the board, else the sliders.
+        by_board: True: the board; False: the sliders.
     """
     controls[parts.LEAD] = _BY_BOARD if by_board else _BY_SLIDERS
     controls.property_overridable_library_set(f'["{parts.LEAD}"]', True)
@@ -119,7 +119,7 @@ def set_lead(controls: ArmatureObject, by_board: bool) -> None:
 
 
 def set_kind(controls: ArmatureObject, kind: str) -> None:
-    """Say which kind of board a face has, before its bones are built.
+    """Set the kind of board of a face, before its bones are built.
 
     Args:
         controls: its control armature, without a board.
@@ -132,14 +132,14 @@ def set_kind(controls: ArmatureObject, kind: str) -> None:
 
 
 def read(seen: ArmatureObject, live: runtime.Runtime) -> Floats:
-    """The GUI controls that the handles ask for, within their ranges.
+    """The values of GUI controls from the handles, within their ranges.
 
     Args:
         seen: the control armature, evaluated or the original one.
         live: the character's Runtime.
 
     Returns:
-        float32[G]; what is no number, and what has lost its handle, is at rest.
+        float32[G]; values that are not finite, and controls without a handle, are at rest.
     """
     places = _places_of(seen, live)
     flat = np.empty(3 * len(places.names), np.float32)
@@ -195,7 +195,7 @@ def _read_moved(
     axes: Iterable[tuple[int, int]],
     gui: Floats,
 ) -> None:
-    """Read a handle where the user's constraints hold it."""
+    """Read a handle that the user's constraints move."""
     local: Matrix = seen.convert_space(
         pose_bone=bone, matrix=bone.matrix, from_space="POSE", to_space="LOCAL"
     )
@@ -211,7 +211,7 @@ def raw_of(gui: Floats, live: runtime.Runtime, sliders: Floats | None) -> Floats
     Args:
         gui: float32[G].
         live: the character's Runtime.
-        sliders: float32[R] for what no GUI control leads to; None for rest.
+        sliders: float32[R] for raw controls without a GUI control; None: at rest.
 
     Returns:
         float32[R].
@@ -223,13 +223,13 @@ def raw_of(gui: Floats, live: runtime.Runtime, sliders: Floats | None) -> Floats
 
 
 def raw_now(rig: ArmatureObject) -> dict[str, float]:
-    """The pose of a face by the names of its sliders, whatever leads.
+    """The pose of a face by slider names, from board or sliders.
 
     Args:
         rig: the character.
 
     Returns:
-        Of each slider that is there; what the board gives where it leads.
+        Value of each existing slider; of a leading board, the values of the board.
     """
     live, face, controls = runtime.there(rig), parts.face_bone(rig), parts.controls_there(rig)
     assert face is not None
@@ -240,7 +240,7 @@ def raw_now(rig: ArmatureObject) -> dict[str, float]:
 
 
 def given(rig: ArmatureObject) -> dict[str, float]:
-    """What a board that leads gives, by the names of the sliders that it leads to.
+    """Values from a leading board, by the names of the sliders that it sets.
 
     Args:
         rig: the character.
@@ -251,15 +251,14 @@ def given(rig: ArmatureObject) -> dict[str, float]:
 
 
 def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
-    """Bring the board to raw controls, as near as it comes; it begins from where it stands.
+    """Move the board as near to raw controls as possible, starting from its current pose.
 
     Args:
         rig: a character with a face board.
-        values: by the names of its sliders; those that the board does not lead to are set on the
-            sliders.
+        values: values by slider names; controls without a handle are set on their sliders.
 
     Returns:
-        What is lost.
+        The loss.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     face = parts.face_bone(rig)
@@ -279,12 +278,12 @@ def put_raw(rig: ArmatureObject, values: Mapping[str, float]) -> board_fit.Loss:
 def fit(
     live: runtime.Runtime, raw: NDArray[np.float64], start: Floats | None = None
 ) -> NDArray[np.float64]:
-    """GUI controls that give raw controls, as near as they come.
+    """GUI controls that give the nearest values of raw controls.
 
     Args:
         live: the character's Runtime.
         raw: float[N, R].
-        start: float[N, G], where the search begins; None for what the table reversed gives.
+        start: float[N, G], start of the search; None: the inverted table of the file.
 
     Returns:
         float64[N, G].
@@ -314,7 +313,7 @@ def write(controls: ArmatureObject, live: runtime.Runtime, gui: NDArray[np.float
 
 
 def handles_of_labels(rig: ArmatureObject, labels: Iterable[str]) -> list[board_layout.Handle]:
-    """The handles that lead to sliders, those that are there.
+    """The existing handles that set given sliders.
 
     Args:
         rig: the character.
@@ -330,7 +329,7 @@ def handles_of_labels(rig: ArmatureObject, labels: Iterable[str]) -> list[board_
 
 
 def handles_in(rig: ArmatureObject, region: str = "") -> list[board_layout.Handle]:
-    """The handles of a region that are there.
+    """The existing handles of a region.
 
     Args:
         rig: the character.
@@ -353,7 +352,7 @@ def reset(controls: ArmatureObject, handles: Iterable[board_layout.Handle]) -> N
 
 
 def places_of(controls: ArmatureObject, live: runtime.Runtime) -> dict[str, tuple[float, ...]]:
-    """Where the handles that are there stand, by their bones.
+    """Locations of the existing handles, by bone.
 
     Args:
         controls: control armature of the character.
@@ -367,12 +366,12 @@ def places_of(controls: ArmatureObject, live: runtime.Runtime) -> dict[str, tupl
 def put_places(
     controls: ArmatureObject, live: runtime.Runtime, places: Mapping[str, tuple[float, ...]]
 ) -> None:
-    """Bring handles to where they stood.
+    """Set handles to stored locations.
 
     Args:
         controls: control armature of the character.
         live: its Runtime.
-        places: from places_of; bones that are not there are passed over.
+        places: from places_of; missing bones are ignored.
     """
     for handle in _handles_there(controls, live):
         if handle.bone in places:
@@ -381,23 +380,23 @@ def put_places(
 
 
 def mark(rig: ArmatureObject, sign: float) -> None:
-    """Mark all handles, to see which of them Blender pastes onto.
+    """Mark all handles, to find the handles that Blender pastes onto.
 
     Args:
         rig: the character.
-        sign: what no hand sets; it goes where a handle has no way.
+        sign: a value that no user sets; it is stored on an axis that a handle does not use.
     """
     for handle in handles_in(rig):
         parts.controls_there(rig).pose.bones[handle.bone].location[2] = sign
 
 
 def pasted_flipped(rig: ArmatureObject, sign: float) -> dict[str, float]:
-    """What Blender pasted flipped onto marked handles, by the names of sliders, not yet flipped.
+    """Values that Blender pasted flipped onto marked handles, by slider names, still unflipped.
 
-    Blender turns each place over and knows no partners.
+    Blender mirrors each location and does not know partners.
 
     Args:
-        rig: the character, which the board leads.
+        rig: the character; its board leads.
         sign: the mark.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
@@ -422,7 +421,7 @@ def is_selected(controls: ArmatureObject, bone: str) -> bool:
 
     Args:
         controls: control armature.
-        bone: name of its bone, which is there.
+        bone: name of its existing bone.
     """
     return compat.is_bone_selected(controls.pose.bones[bone])
 
@@ -432,8 +431,8 @@ def select(controls: ArmatureObject, bones: Iterable[str], extend: bool) -> None
 
     Args:
         controls: control armature.
-        bones: names of theirs.
-        extend: keep what is selected.
+        bones: names of their bones.
+        extend: True: add to the selection.
     """
     chosen = set(bones)
     for bone in controls.pose.bones:

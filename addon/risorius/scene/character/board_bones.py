@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The bones of a face board: built beside the head, mended, taken away.
+"""The bones of a face board: building, repairing, removing.
 
-The bone `board` holds all of it at the board's scale, by a constraint: so the place of a handle is
-the value of its GUI control, which actions carry from face to face whatever its size.
+A constraint scales the bone `board` and all handles below it. So the location of a handle is the
+value of its GUI control, and actions fit faces of every size.
 """
 
 from __future__ import annotations
@@ -36,21 +36,21 @@ _BORDER_COLOUR = (0.25, 0.75, 0.45)
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a board stands: its middle, and Blender units for one of its own."""
+    """Place of a board: its centre, and Blender units for one unit of the board."""
 
     middle: Vector
     unit: float
 
 
 def add(context: Context, rig: ArmatureObject) -> int:
-    """Build the face board of a character, or those bones of it that are missing.
+    """Build the face board of a character, or its missing bones.
 
     Args:
         context: with a view layer.
         rig: the character, whose control armature is of this file.
 
     Returns:
-        How many handles were made.
+        The number of new handles.
     """
     live, controls = runtime.there(rig), parts.controls_there(rig)
     layout = _layout(live)
@@ -89,14 +89,14 @@ def _layout(live: runtime.Runtime) -> Board:
 
 
 def remove(context: Context, rig: ArmatureObject) -> int:
-    """Take the face board of a character away; keys on it stay in their actions.
+    """Remove the face board of a character; its keys stay in their actions.
 
     Args:
         context: with a view layer.
         rig: the character, whose control armature is of this file.
 
     Returns:
-        How many bones were removed.
+        The number of removed bones.
     """
     controls = parts.controls_there(rig)
     there = [bone.name for bone in controls.data.bones if parts.BOARD in bone]
@@ -185,7 +185,7 @@ def _points(live: runtime.Runtime, deltas: NDArray[np.float32]) -> NDArray[np.fl
 
 
 def _near(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """Where a primary board goes."""
+    """The place of a primary board."""
     middle, unit = primary_layout.beside(*_box(lods.heads(rig), live), layout.width)
     return _Place(Vector(middle), unit)
 
@@ -206,7 +206,7 @@ def _box(
 
 
 def _beside(rig: ArmatureObject, live: runtime.Runtime, layout: Board) -> _Place:
-    """Where a complete board goes: beside the head, as high as that."""
+    """The place of a complete board: beside the head, with its height."""
     low, high = _box(parts.meshes_of(rig), live, joints=True)
     size = float((high - low).max())
     unit = size * _SHARE / layout.height

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the control bones look like: each has an outline that tells what it moves, and a colour."""
+"""The look of the control bones: each has an outline and a colour for the part that it moves."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _COUNT = 32
 
 @dataclass(frozen=True)
 class Room:
-    """Where a face lies at the height of its eyes, in the space of its control armature.
+    """Extent of a face at the height of its eyes, in the space of its control armature.
 
     Attributes:
-        middle: x of its middle.
-        eyes: x between them.
-        wide: from the middle to its side.
+        middle: x of its centre.
+        eyes: x between the eyes.
+        wide: distance from the centre to its side.
         top: z of its highest point, hair included.
     """
 
@@ -57,7 +57,7 @@ def _band(low: float, high: float) -> Line:
 
 
 def _cross() -> list[Line]:
-    """A ring with four marks: what one takes aim with."""
+    """A ring with four marks, as of a gun sight."""
     marks = []
     for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)):
         marks.append([(0.72 * x - 0.04 * y, 0.72 * y + 0.04 * x), (1.3 * x, 1.3 * y),
@@ -80,7 +80,8 @@ _OUTLINES: dict[str, list[Line]] = {
     "eyes": _cross(),
     "face": [_ring(), _ring(0.11, -0.36, 0.3), _ring(0.11, 0.36, 0.3), _band(0.5, 0.62)],
 }  # fmt: skip
-# Yellow for the head, its neck darker; the two eyes as warm and cold; what bears the sliders green.
+# Yellow for the head, darker for its neck; warm and cold for the two eyes; green for the bone with
+# the sliders.
 _COLOURS = {
     "head": (0.95, 0.75, 0.15),
     "neck": (0.75, 0.45, 0.10),
@@ -135,7 +136,7 @@ def drawn(name: str, lines: Sequence[Line]) -> bpy.types.Object:
 
 
 def disc(name: str) -> bpy.types.Object:
-    """A filled disc of radius 1, which is easily hit by the mouse. Args: name  of it."""
+    """A filled disc of radius 1, easy to click. Args: name of the datablocks."""
     mesh = bpy.data.meshes.new(name)
     ring = [(x, y, 0.0) for x, y in _ring()]
     # Two faces: Blender draws none from behind, where some handles are seen from.
@@ -145,14 +146,14 @@ def disc(name: str) -> bpy.types.Object:
 
 
 def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
-    """Turn and size the outline so that it stands beside the turned part, and colour it.
+    """Turn and scale the outline to stand beside its body part, and colour it.
 
-    From the front nothing lies over the eyes, and what Blender frames with the bones is the head.
+    From the front no outline covers the eyes, and framing the bones frames the head.
 
     Args:
-        bone: the control bone, which has its outline.
-        name: which of the control bones it is.
-        room: what the face takes.
+        bone: the control bone with its outline.
+        name: name of the control bone.
+        room: extent of the face.
     """
     scale, offset = _placed(bone.bone, name, room)
     bone.custom_shape_scale_xyz = (scale, scale, scale)
@@ -163,11 +164,12 @@ def place(bone: bpy.types.PoseBone, name: str, room: Room) -> None:
 
 
 def step_aside(controls: ArmatureObject, aside: bool) -> None:
-    """Draw the outline of the sliders' bone on the other side of the head, out of a board's way.
+    """Move the outline of the bone with the sliders to the other side of the head, away from a
+    board.
 
     Args:
         controls: control armature of a face.
-        aside: there, else at the bone; an outline that the user has moved stays.
+        aside: True: to the other side; False: back. An outline that the user moved stays.
     """
     bone, head = controls.pose.bones[parts.FACE], controls.data.bones.get("head")
     if head is None:
@@ -180,12 +182,12 @@ def step_aside(controls: ArmatureObject, aside: bool) -> None:
 
 
 def is_placed(bone: bpy.types.PoseBone, name: str, room: Room) -> bool:
-    """Whether an outline stands as `place` puts it: the user has neither sized nor moved it.
+    """Whether an outline is as `place` set it, and the user has not scaled or moved it.
 
     Args:
         bone: the control bone.
-        name: which of the control bones it is.
-        room: what the face takes.
+        name: name of the control bone.
+        room: extent of the face.
     """
     scale, offset = _placed(bone.bone, name, room)
     near = 1e-3 * bone.bone.length
@@ -214,11 +216,11 @@ def _placed(bone: bpy.types.Bone, name: str, room: Room) -> tuple[float, Vector]
 
 
 def colour(bone: bpy.types.PoseBone, normal: tuple[float, float, float]) -> None:
-    """Colour a bone: brighter where it is selected.
+    """Colour a bone, with a brighter colour when selected.
 
     Args:
         bone: any pose bone.
-        normal: red, green, blue where it is not.
+        normal: red, green, blue of the unselected bone.
     """
     look = bone.color
     assert look is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the bytes of a DNA file to a character in the scene, or to nothing at all."""
+"""From the bytes of a DNA file to a complete character in the scene, or to no change."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from . import armatures, meshes, runtime, values
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """What the user chose.
+    """Options of an import.
 
     Attributes:
         lods: levels whose meshes are built.
         mode: LIVE, KEYS or AUTO.
         normals: keep the file's normals.
         materials: build materials.
-        textures: load the textures that lie beside the file.
-        texture_folder: looked into first; empty for none.
-        simple_materials: without subsurface, relief and animated maps.
+        textures: load textures beside the file.
+        texture_folder: folder to search first; empty for none.
+        simple_materials: make materials without subsurface, relief and animated maps.
         unit: metres per Blender unit; None takes the scene's.
-        nearest_lods: where the file has none of the levels, build its finest instead.
+        nearest_lods: build the finest level of the file if it has none of the chosen levels.
     """
 
     lods: tuple[int, ...] = (0,)
@@ -49,13 +49,13 @@ class BuildOptions:
 
 @dataclass(frozen=True)
 class _File:
-    """What was read and compiled once.
+    """A file, read and compiled once.
 
     Attributes:
         path: of the file.
         content: its bytes.
-        dna: what was read from them.
-        rig: the risorius.Rig of it.
+        dna: the Dna of these bytes.
+        rig: its risorius.Rig.
     """
 
     path: Path
@@ -91,7 +91,7 @@ def import_file(
 
     Raises:
         DnaError: the file is bad or cannot be read.
-        PlanError, SpaceError: there is no character in it.
+        PlanError, SpaceError: the file has no character.
     """
     file = _read(path)
     dna = file.dna
@@ -168,11 +168,11 @@ def _first(plan: plans.CharacterPlan) -> int:
 
 
 def settle(context: Context, *items: bpy.types.Object) -> None:
-    """Bring new custom properties to the evaluated copies.
+    """Update the evaluated copies after adding custom properties.
 
     Args:
-        context: its view layer is brought up to date.
-        items: the objects whose properties are new.
+        context: its view layer is updated.
+        items: objects with new properties.
     """
     for item in items:
         item.update_tag()
@@ -213,7 +213,8 @@ def _source(path: Path) -> str:
 def _find_textures(
     plan: plans.CharacterPlan, path: Path, options: BuildOptions
 ) -> texture_search.TexturePlan:
-    """The textures beside the file and in the chosen folder; none where none are wanted."""
+    """The textures beside the file and in the chosen folder; empty if the options exclude
+    textures."""
     if not options.textures:
         return texture_search.TexturePlan()
     chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""
@@ -298,7 +299,7 @@ def change_mode(rig: ArmatureObject, mode: str) -> list[str]:
 
 
 def remove(rig: ArmatureObject) -> None:
-    """Take a character and all that belongs to it out of the file; what a copy of it uses stays."""
+    """Remove a character and its data from the file; data that a copy of it uses stay."""
     controls = parts.controls_of(rig)
     text = storage.text_of(rig)
     items = parts.meshes_of(rig)
@@ -317,7 +318,7 @@ def remove(rig: ArmatureObject) -> None:
 
 
 def _remove(made: Iterable[bpy.types.ID | None]) -> None:
-    """Remove those datablocks that still live."""
+    """Remove datablocks that still exist."""
     alive = []
     for item in dict.fromkeys(made):
         try:

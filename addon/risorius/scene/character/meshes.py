@@ -106,7 +106,7 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
         for vertex, begin, end in zip(edit.verts, offsets[:-1], offsets[1:], strict=True):
             held: Any = vertex[layer]  # weights by group, as a dict
             for i in range(begin, end):
-                # A joint may stand twice at a vertex: its weights add up.
+                # A vertex may list a joint twice; its weights are added.
                 held[groups[i]] = held.get(groups[i], 0.0) + weights[i]
         edit.to_mesh(item.data)
     finally:
@@ -114,10 +114,11 @@ def _add_weights(item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[s
 
 
 def real_channels(item: MeshObject) -> dict[str, int]:
-    """Shape key name -> channel, of the keys of a mesh that are ours: found by their drivers.
+    """Shape key name -> channel, for the real keys that Risorius made; their drivers identify them.
 
-    A key that the user drives by a channel is the user's: our variable's name tells. Where a
-    driver was copied onto another key, the first key of the list is ours.
+    A key that the user drives by a channel belongs to the user: the name of the driver's variable
+        differs. If a driver was copied onto another key, the first key of the list belongs to
+        Risorius.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}
@@ -137,10 +138,10 @@ def real_channels(item: MeshObject) -> dict[str, int]:
 
 
 def live_block(item: MeshObject) -> bpy.types.ShapeKey | None:
-    """The key that bears the channel sum, also after it was renamed; None without one.
+    """The live key, also after renaming; None if the mesh has none.
 
-    It is marked by its interpolation, which has no meaning for relative keys and survives
-    renames, reordering, copies and files; the name is only the short way to it.
+    Its interpolation marks it, because this has no effect on relative keys and survives renames,
+    reordering, copies and files. The name is only a shortcut.
     """
     key = item.data.shape_keys
     if key is None:
@@ -159,10 +160,10 @@ def set_mode(
     labels: Sequence[str],
     mode: str,
 ) -> bool:
-    """Bring a mesh's shapes into LIVE or KEYS mode; the same vertices in both.
+    """Switch the shapes of a mesh to LIVE or KEYS mode, with the same vertices.
 
-    What the user changed in a real key stays: such a key is kept as a real one in LIVE mode.
-    Keys of the user's own are not touched.
+    A real key that the user edited stays a real key in LIVE mode. The user's own keys stay as they
+    are.
 
     Args:
         item: mesh object.
@@ -173,7 +174,8 @@ def set_mode(
         mode: LIVE or KEYS.
 
     Returns:
-        Whether it could: a mesh with another number of vertices than its file stays as it is.
+        Whether the mode changed; a mesh whose number of vertices differs from its file stays as it
+        is.
     """
     if not dna_mesh.blend_shape_targets:
         item[parts.MODE] = mode
@@ -205,11 +207,11 @@ def imported_basis(dna_mesh: native.Mesh, space: Space) -> NDArray[np.float32]:
 
 
 def deltas_by_channel(dna_mesh: native.Mesh, matrix: NDArray[np.float32]) -> dict[int, Deltas]:
-    """The blend shape targets of a mesh by their channel; those of one channel are joined.
+    """The blend shape targets of a mesh by their channel; targets of one channel are joined.
 
     Args:
         dna_mesh: risorius.Mesh.
-        matrix: float32[3, 3] that turns and scales the DNA's deltas to Blender's axes and unit.
+        matrix: float32[3, 3], converts deltas from the DNA's axes and unit to Blender's.
 
     Returns:
         Channel -> (vertex indices, float32[K, 3] deltas).
@@ -245,7 +247,7 @@ def basis_of(item: MeshObject) -> NDArray[np.float32]:
 def edits_of(
     block: bpy.types.ShapeKey, imported: NDArray[np.float32], deltas: Deltas
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """What the user changed in the shape of a real key.
+    """The user's edits of a real key.
 
     Args:
         block: the key.
@@ -260,7 +262,7 @@ def edits_of(
 
 
 def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
-    """Add a real shape key of value 0, which may go from -10 to 10.
+    """Add a real shape key with value 0 and range -10 to 10.
 
     Args:
         item: the mesh object.
@@ -281,11 +283,11 @@ def add_key(item: MeshObject, name: str, deltas: Deltas) -> bpy.types.ShapeKey:
 def add_channel_key(
     item: MeshObject, rig: ArmatureObject, channel: int, name: str, deltas: Deltas
 ) -> bpy.types.ShapeKey:
-    """Add a real shape key that follows a channel by a driver.
+    """Add a real shape key with a driver that follows a channel.
 
     Args:
         item: the mesh object.
-        rig: deforming armature, which has the channels' weights.
+        rig: deforming armature with the weights of channels.
         channel: index of the blend shape channel.
         name: of the key.
         deltas: (vertex indices, float32[K, 3]) from the reference key, in Blender units.
@@ -354,14 +356,13 @@ def _to_live(
 
 
 def add_live_key(item: MeshObject) -> None:
-    """Add the key that bears the channel sum, or finished positions. Args: item  the mesh."""
+    """Add the live key, for the sum of channels or for final positions. Args: item the mesh."""
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis", from_mix=False)
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)
     block.value = 1.0
     block.interpolation = _LIVE_MARK
-    # Edits in it are lost at the next change of a control: nobody shall get there by entering
-    # edit mode.
+    # Edits of this key are lost at the next change of a control, so edit mode must not open it.
     block.lock_shape = True
     item.active_shape_key_index = 0
     item[parts.MODE] = "LIVE"
@@ -370,13 +371,13 @@ def add_live_key(item: MeshObject) -> None:
 def touched(
     key: bpy.types.Key, block: bpy.types.ShapeKey, imported: NDArray[np.float32], deltas: Deltas
 ) -> bool:
-    """Whether a key of ours bears something that the channel sum cannot.
+    """Whether a real key of Risorius has an edit that the live key cannot contain.
 
     Args:
         key: the shape keys of the mesh.
-        block: the one in question.
-        imported: float32[V, 3], the neutral mesh as an import gives it.
-        deltas: (vertex indices, float32[K, 3]) that the DNA has for its channel.
+        block: the real key.
+        imported: float32[V, 3], the imported neutral mesh.
+        deltas: (vertex indices, float32[K, 3]) of its channel in the DNA file.
     """
     if block.mute or block.vertex_group or block.relative_key != key.reference_key:
         return True

@@ -47,15 +47,15 @@ def show(controls: ArmatureObject) -> None:
 
 
 def stand_beside(rig: ArmatureObject) -> int:
-    """Put the outlines where a face that is made today has them.
+    """Move the outlines to the places of a newly imported face.
 
-    Those of files from before stand over the eyes. Sizes that were changed by hand go with it.
+    In older files they stand over the eyes. Sizes that the user changed are lost.
 
     Args:
         rig: the character's deforming armature.
 
     Returns:
-        How many outlines were moved or sized.
+        The number of moved or scaled outlines.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     levels, unit = tuple(lods.built(rig)) or (0,), runtime.unit_of(rig)
@@ -78,16 +78,16 @@ def _bones(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.PoseBone]]
 
 
 def tidy(controls: ArmatureObject) -> int:
-    """Take the objects whose outlines the bones show out of all collections.
+    """Remove the custom shape objects of the bones from all collections.
 
-    Blender's Append puts each object without a collection into the scene, where it would lie
-    visible at the origin.
+    Blender's Append puts each object without a collection into the scene, where it would be visible
+    at the origin.
 
     Args:
-        controls: control armature of a face that has just come.
+        controls: control armature of an appended face.
 
     Returns:
-        How many objects left the scene.
+        The number of objects that left the scene.
     """
     # The pose of an object that has just been read knows no bones yet: the armature does.
     names = {b.name for b in controls.data.bones if parts.PART in b or parts.BOARD in b}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where a face stands: the rig follows the control armature, that follows a body.
+"""The place of a face: the rig follows the control armature, which follows a body.
 
-Neither is the other's parent: a parent's edit would make Blender deform the meshes twice.
+Neither is a parent of the other, because an edit of a parent makes Blender deform the meshes twice.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
     if not _follows(rig):
         return
     wanted = np.array(seen.matrix_world, np.float64)  # float32 in Blender 5
-    # Also what is only a rounding away is written: a frame shall not keep the one before it.
+    # Write differences of rounding too, so that a frame does not depend on the frame before it.
     if last_written.is_new(last_written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
         rig.matrix_basis = seen.matrix_world
 
@@ -55,10 +55,10 @@ def _is_at(rig: ArmatureObject, wanted: NDArray[np.float64]) -> bool:
 
 
 def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
-    """Move a new face to the right until it stands on no other one's spot.
+    """Move a new face to the right until no other face stands at its place.
 
     Args:
-        scene: the others are those of it, linked ones too.
+        scene: the scene with the other faces, including linked ones.
         rig: the deforming armature, at the origin.
 
     Returns:
@@ -74,10 +74,10 @@ def put_beside(scene: bpy.types.Scene, rig: ArmatureObject) -> bool:
 
 
 def put_beside_mesh(rig: ArmatureObject, item: bpy.types.Object) -> None:
-    """Move a new face beside what it was made from.
+    """Move a new face beside its source mesh.
 
     Args:
-        rig: the deforming armature, whose file has the mesh' own origin.
+        rig: the deforming armature; its file has the origin of the mesh.
         item: the mesh.
     """
     place = item.matrix_world.translation
@@ -115,8 +115,8 @@ def find_bones(body: ArmatureObject) -> tuple[str, str, str]:
         body: an armature object.
 
     Returns:
-        (base, neck, head): bone names, "" where there is none. The base is what the neck hangs
-        from, so that the seam at the neck stays closed when the neck bends.
+        (base, neck, head): bone names, "" if missing. The base is the parent of the neck, so that
+        the seam at the neck stays closed when the neck bends.
     """
     bones = list(body.data.bones)
     head = _named(bones, "head")
@@ -127,7 +127,7 @@ def find_bones(body: ArmatureObject) -> tuple[str, str, str]:
 
 
 def _named(bones: Iterable[bpy.types.Bone], word: str) -> str:
-    """The bone nearest to the root whose name has the word standing alone, or ""."""
+    """The bone nearest to the root whose name contains the word as a whole word, or ""."""
     pattern = re.compile(rf"(?:^|[^a-z]){word}(?![a-z])", re.IGNORECASE)
     found = [b for b in bones if pattern.search(_split(b.name))]
     found.sort(key=lambda b: (len(b.parent_recursive), b.name))
@@ -154,8 +154,8 @@ def attach(
         body: an armature object, at any scale.
         base: the bone that carries the whole face.
         neck, head: the body's bones that turn the face's own neck and head; "" for none.
-        fit: NONE leaves the face where it is; MOVE puts its head (else its neck) on the body's
-            as both rest; SCALE also makes its neck as long as the body's.
+        fit: NONE keeps the place of the face; MOVE puts its head (or its neck) on the body's at
+            rest; SCALE also scales its neck to the length of the body's.
     """
     detach(controls)
     if fit != "NONE":
@@ -193,17 +193,17 @@ def body_of(controls: ArmatureObject) -> bpy.types.ChildOfConstraint | None:
 
 
 def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quaternion]:
-    """What a body's bones ask of the face's own neck and head, beyond what the base does.
+    """Rotations of a body's neck and head for the face, relative to the base bone.
 
-    Constraints between bones copy local rotations as if both armatures stood alike; bodies from
-    other programs are turned and scaled objects.
+    Copy constraints of bones are no alternative: they assume equal object rotations, and bodies
+        from other programs are rotated and scaled objects.
 
     Args:
         controls: the control armature, the original.
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes, without straight ones.
+        "neck" and "head" -> Quaternion in the control armature's axes; rest rotations are left out.
     """
     hold = body_of(controls)
     if hold is None:
@@ -269,7 +269,7 @@ def _fit(controls: ArmatureObject, body: ArmatureObject, neck: str, head: str, s
 
 
 def detach(controls: ArmatureObject) -> None:
-    """Take a face off its body; it stays where it stands."""
+    """Detach a face from its body; it keeps its place."""
     holds = [c for c in controls.constraints if c.name == CONSTRAINT]
     if holds:
         where = controls.matrix_world.copy()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is compiled from a character's DNA, kept by the hash of its content.
+"""Compiled data of a character's DNA, kept by the hash of its content.
 
-Holds no Blender object: it is found anew, or rebuilt, after load, undo, append and enable.
+It holds no Blender object. It is found again or rebuilt after load, undo, append and enable.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...logic.character import board_layout, board_table, plans, primary_table
 from ..base import console, last_written, parts, saved, session, storage
 from ..base.blender_types import ArmatureObject, MeshObject
 
-# The bones of the control armature beside those of a face board.
+# The bones of the control armature without the face board.
 CONTROL_BONES = (parts.FACE, "neck", "head", "eyes", "eye_L", "eye_R")
 BOARD_BONES = ("board", "board_frames")  # by which a board is taken, and what is drawn on it
 COMPLETE, PRIMARY = "COMPLETE", "PRIMARY"  # the two kinds of board
@@ -35,19 +35,19 @@ class Runtime:
 
     Attributes:
         dna: the file; rig: its risorius.Rig; space: its Space.
-        labels: property names of the raw controls, by index.
-        rests: their values at rest.
-        lowest: the least that they can be: parts of rotations go below 0.
+        labels: property names of the raw controls by index.
+        rests: rest values of the raw controls.
+        lowest: lowest values of the raw controls; components of rotations go below 0.
         owned: the joints that the evaluator writes.
         rest: float64[J, 4, 4] neutral joints.
         anchors: joints of neck, head and eyes.
-        look: control name -> yaw or pitch (radians) that a value of 1 gives; by side.
-        lids: the controls that close and widen an eye, by eyeBlink or eyeWiden and the side.
-        turning: the joints whose rotation raw controls hold.
+        look: for each side, control name -> yaw or pitch in radians at value 1.
+        lids: controls that close and widen an eye, by eyeBlink or eyeWiden and the side.
+        turning: joints whose rotation is stored in raw controls.
         morphs: mesh index -> risorius.Morph.
         surfaces: level of detail -> risorius.Surface.
         chains: joint -> Chain.
-        board: the kind of face board that `table` and `handles` are of: PRIMARY or COMPLETE.
+        board: kind of the face board of `table` and `handles`: PRIMARY or COMPLETE.
     """
 
     dna: native.Dna
@@ -119,7 +119,7 @@ class Runtime:
 
     @cached_property
     def handles(self) -> list[board_layout.Handle]:
-        """The sliders of the face board; those of a complete one lie nowhere yet."""
+        """The handles of the face board; handles of a complete board have no places yet."""
         taken = (*CONTROL_BONES, *BOARD_BONES)
         if self.board == PRIMARY:
             return primary_table.handles_of(self.table, {}, taken)
@@ -128,7 +128,7 @@ class Runtime:
         return board_layout.handles_of(self.table, ways, region_of, taken)
 
     def bone_space(self, joints: Sequence[int]) -> native.BoneSpace:
-        """The native conversion of poses for bones that stand for these joints."""
+        """The native conversion of poses for the bones of these joints."""
         space = self.space
         return native.module().BoneSpace(
             self.dna.neutral_joint_rotations,
@@ -143,14 +143,15 @@ class Runtime:
 
 @dataclass(frozen=True)
 class Turning:
-    """A joint whose rotation four raw controls hold.
+    """A joint whose rotation is stored in four raw controls.
 
     Attributes:
         joint: its index.
         controls: indices of the raw controls of x, y, z and w.
-        bone: the control bone that turns the joint, "neck" or "head"; "" where none does.
-        share: of the control bone's turn that the joint takes.
-        armature_axes: takes the vector part of a rotation about the armature's axes to the file's.
+        bone: the control bone that turns the joint, "neck" or "head"; "" for none.
+        share: share of the control bone's rotation for the joint.
+        armature_axes: converts the vector part of a rotation from the armature's axes to the
+            file's.
         bone_axes: the same for a rotation about the axes of the joint's bone.
     """
 
@@ -209,7 +210,7 @@ def of(rig: ArmatureObject, board: str | None = None) -> Runtime | None:
         try:
             _cache[key] = _compile(storage.content(text), key[1])
         except (native.dna_error(), SpaceError, ValueError, LookupError) as error:
-            # Said once, not at every frame; the panel says that the data is lost.
+            # Print it once, not at every frame; the panel shows the loss too.
             words = names.printable(str(error)).rstrip(".")
             console.say(f"the data of {rig.name} cannot be read: {words}.")
             _cache[key] = None
@@ -229,12 +230,12 @@ def there(rig: ArmatureObject, board: str | None = None) -> Runtime:
 
 
 def take(armature: ArmatureObject, dna: native.Dna, rig: native.Rig) -> None:
-    """Keep what was read and compiled at an import: it is not done again for the same bytes.
+    """Keep the compiled data of an import, so that the same bytes are not compiled again.
 
     Args:
-        armature: the deforming armature, which has its Text and its unit.
-        dna: what was read from the bytes in that Text.
-        rig: the risorius.Rig that was compiled of it.
+        armature: the deforming armature with its Text and unit.
+        dna: the Dna of the bytes in that Text.
+        rig: its risorius.Rig.
 
     Raises:
         PlanError: the file cannot be evaluated.
@@ -275,7 +276,7 @@ def unit_of(rig: ArmatureObject) -> float:
 
 
 def forget_unused(rigs: Iterable[ArmatureObject]) -> None:
-    """Drop compiled data of characters that are gone. Args: rigs  those that are there."""
+    """Drop compiled data of deleted characters. Args: rigs existing ones."""
     used = {storage.content_hash(rig.get(parts.DNA)) for rig in rigs}
     for key in [k for k in _cache if k[0] not in used]:
         del _cache[key]

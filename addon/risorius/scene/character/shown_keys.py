@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keys of a face are seen in the animation editors.
+"""Make keys of a face visible in the animation editors.
 
-These show keys of selected objects alone, and of a bone only while it is selected. Whatever keys a
-face calls `show`; what was selected before stays so.
+The editors show keys of selected objects and selected bones only. Code that keys a face calls
+`show`. The existing selection stays.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ _counts: dict[int, tuple[int, int]] = session.table("shown_keys.counts", ("undo"
 
 
 def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
-    """Let the animation editors show keys that a face just got.
+    """Make new keys of a face visible in the animation editors.
 
-    The bone of the sliders is selected: it is locked, and no hand moves it by accident. The bones
-    of head and eyes are selected outside of pose mode, where no hand moves them either: whoever
-    moves a column of keys takes theirs along. In pose mode they are selected only where none of the
-    bones that were keyed is, and handles of a face board so in every mode.
+    The bone with the sliders is selected: it is locked, so nobody moves it by accident. Outside
+        pose mode the bones of head and eyes are selected too, so that moving a column of keys moves
+        their keys. In pose mode they are selected only if none of the keyed bones is selected.
+        Handles of a face board follow this rule in every mode.
 
     Args:
         controls: control armature of the face.
-        paths: data paths that were keyed, from it.
+        paths: keyed data paths of the armature.
     """
     show_object(current_context(), controls)
     bones = controls.pose.bones
@@ -57,7 +57,7 @@ def show_some(controls: ArmatureObject) -> None:
 
 
 def show_object(context: Context, controls: ArmatureObject) -> None:
-    """Select the controls beside what is selected, in pose mode too where the active object is.
+    """Add the controls to the selection, in pose mode if the active object is in pose mode.
 
     Args:
         context: a Blender context.
@@ -76,7 +76,7 @@ def show_object(context: Context, controls: ArmatureObject) -> None:
 
 
 def note_edit(controls: ArmatureObject) -> None:
-    """Show keys of sliders that Blender's own operators inserted: there are more of them now.
+    """Make keys of sliders visible that Blender's own operators inserted.
 
     Args:
         controls: a control armature whose action was edited.

@@ -22,7 +22,8 @@ _OTHER_BONE = {"eye_L": "eye_R", "eye_R": "eye_L"}
 
 
 def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
-    """The sliders of a face, or of one region, with their values; the board's where it leads.
+    """The sliders of a face or region with their values; of a leading board, the values of the
+    board.
 
     Args:
         rig: the character.
@@ -34,16 +35,16 @@ def values_of(rig: ArmatureObject, region: str = "") -> dict[str, float]:
 
 
 def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
-    """Set sliders, within their limits; those that follow others and those that are not there stay.
+    """Set sliders within their limits. Sliders that follow others stay, missing ones are ignored.
 
-    Where the face board leads, it is brought as near as it comes.
+    A leading face board is moved as near as possible.
 
     Args:
         rig: the character.
-        values: by the names of the sliders.
+        values: values by slider names.
 
     Returns:
-        How many were set.
+        The number of sliders set.
     """
     face, controls, live = parts.face_bone(rig), parts.controls_there(rig), runtime.there(rig)
     assert face is not None
@@ -63,7 +64,7 @@ def put(rig: ArmatureObject, values: Mapping[str, float]) -> int:
 
 @dataclass(frozen=True)
 class Held:
-    """What sliders and handles of a face board were, to give it back exactly.
+    """Stored values of sliders and handles, for an exact restore.
 
     Attributes:
         sliders: name -> value.
@@ -75,7 +76,7 @@ class Held:
 
 
 def hold(rig: ArmatureObject) -> Held:
-    """What a face shows now, whoever leads it. Args: rig  the character."""
+    """Store the current sliders and handles. Args: rig the character."""
     face, live, controls = parts.face_bone(rig), runtime.there(rig), parts.controls_there(rig)
     assert face is not None
     sliders = {label: face[label] for label in live.labels if label in face}
@@ -83,7 +84,7 @@ def hold(rig: ArmatureObject) -> Held:
 
 
 def restore(rig: ArmatureObject, held: Held) -> None:
-    """Give sliders and handles what they had, whatever their limits.
+    """Restore sliders and handles, ignoring limits.
 
     Args:
         rig: the character.
@@ -142,16 +143,16 @@ def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
 
 
 def link(rig: ArmatureObject, from_left: bool) -> int:
-    """Let the sliders of one side follow those of the other, by drivers that anyone can see.
+    """Let the sliders of one side follow the other side with visible drivers.
 
-    A slider that has a driver already is left alone.
+    A slider with a driver stays as it is.
 
     Args:
         rig: the character.
-        from_left: its own left side leads.
+        from_left: True: the character's left side leads.
 
     Returns:
-        How many follow.
+        The number of following sliders.
     """
     controls, live = parts.controls_there(rig), runtime.there(rig)
     unlink(rig)
@@ -174,7 +175,7 @@ def link(rig: ArmatureObject, from_left: bool) -> int:
 
 
 def unlink(rig: ArmatureObject) -> None:
-    """Let each side go its own way again, from where it stands."""
+    """Free both sides at their current values."""
     controls, face = parts.controls_there(rig), parts.face_bone(rig)
     assert face is not None
     for follower, leader in followers(controls).items():

@@ -71,11 +71,11 @@ def write(item: MeshObject, groups: Weights) -> None:
 
 
 def edited_vertices(present: Weights, wanted: Weights) -> set[int]:
-    """The vertices at which weights differ from those of the file.
+    """The vertices whose weights differ from the file.
 
     Args:
         present: {group: {vertex: weight}} of the object.
-        wanted: the same of the file; only its groups are compared.
+        wanted: weights of the file; only its groups are compared.
     """
     edited = set()
     for name, values in wanted.items():

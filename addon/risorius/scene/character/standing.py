@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What of a face is neither at rest nor moved by anything: an animation leaves it as it was."""
+"""Controls that are not at rest and that nothing moves: an animation leaves them unchanged."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _NAMED = 12  # controls that a sentence names
 
 @dataclass(frozen=True)
 class Standing:
-    """What stands.
+    """Controls that are not at rest and that nothing moves.
 
     Attributes:
-        sliders: their values by their names.
+        sliders: values by name.
         handles: bones of the face board that are not at rest.
     """
 
@@ -29,7 +29,7 @@ class Standing:
 
     @property
     def sentence(self) -> Sentence | None:
-        """The sentence for the user; None where there is nothing to tell."""
+        """The sentence for the user, or None."""
         values = {**self.sliders, **dict.fromkeys(self.handles)}
         if not values:
             return None
@@ -44,7 +44,7 @@ class Standing:
 
 
 def beside(rig: ArmatureObject) -> Standing:
-    """What of a face is neither at rest nor moved by an action that it plays or a driver.
+    """The controls of a face that are not at rest and that no action or driver moves.
 
     Args:
         rig: the character.
@@ -72,7 +72,7 @@ def beside(rig: ArmatureObject) -> Standing:
 
 
 def bring_to_rest(rig: ArmatureObject, found: Standing) -> None:
-    """Bring to rest what stands.
+    """Set these controls to rest.
 
     Args:
         rig: the character.

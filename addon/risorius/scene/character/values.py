@@ -23,10 +23,10 @@ def write(
     """Write the arrays of a face.
 
     Args:
-        rig: deforming armature; nothing tells Blender of it.
+        rig: deforming armature; Blender is not notified.
         maps: float32[M], of the animated maps.
         channels: float32[C].
-        simulated: whether an edit of a mesh resets a simulation.
+        simulated: returns whether an edit of a mesh resets a simulation.
     """
     _fill(rig, parts.CHANNELS, channels)
     _fill(rig, parts.MAPS, maps)
@@ -42,7 +42,7 @@ def write(
 def _fill_unheard(
     rig: ArmatureObject, carrier: bpy.types.Object, maps: NDArray[np.float32]
 ) -> None:
-    """Write maps to the copies of their carrier in all graphs, and let materials read them anew."""
+    """Write maps to the evaluated copies of their carrier, and make materials read them again."""
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
     for graph in (layer.depsgraph for layer in layers):
         seen = carrier.evaluated_get(graph) if graph is not None else carrier
@@ -82,11 +82,11 @@ def carry_on_largest(rig: ArmatureObject) -> None:
 
 
 def point_materials(rig: ArmatureObject, owner: bpy.types.Object) -> None:
-    """Point the drivers of a character's materials at the object that bears their values.
+    """Point the drivers of a character's materials at the object with their values.
 
     Args:
         rig: deforming armature.
-        owner: that, or the mesh that carries its maps.
+        owner: the deforming armature, or the mesh that carries its maps.
     """
     for item in parts.meshes_of(rig):
         for slot in item.material_slots:

@@ -23,10 +23,10 @@ _placed: WeakKeyDictionary[native.Surface, list[Point]] = session.keep(
 
 
 def of(surface: native.Surface) -> list[Point]:
-    """The handles of a face: mesh and vertex of each, found when first asked for.
+    """The handles of a face: mesh and vertex of each, computed at the first call.
 
     Args:
-        surface: of the level of detail that is seen; its largest mesh is the skin.
+        surface: surface of the visible level of detail; its largest mesh is the skin.
     """
     if surface not in _placed:
         shown = surface.mesh_indices
@@ -41,7 +41,7 @@ def offered(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
 
     Args:
         rig: the character.
-        surface: as for `of`.
+        surface: see `of`.
     """
     hidden = kept_points.of(rig, kept_points.HIDDEN, surface.vertex_counts)
     return [point for point in of(surface) if point not in hidden]
@@ -54,12 +54,12 @@ def selected(rig: ArmatureObject, surface: native.Surface) -> list[Point]:
 
 
 def sliders_of(context: Context, rig: ArmatureObject) -> list[str]:
-    """The sliders that belong to the selected handles: those that move one of them noticeably.
+    """The sliders that move a selected handle noticeably.
 
-    What drivers or layers lead belongs to none.
+    Sliders led by drivers or layers are left out.
 
     Args:
-        context: has the scene that is seen.
+        context: has the visible scene.
         rig: the character.
     """
     live = runtime.there(rig)
@@ -76,17 +76,17 @@ def sliders_of(context: Context, rig: ArmatureObject) -> list[str]:
 
 
 def key(context: Context, rig: ArmatureObject) -> int:
-    """Key what belongs to the selected handles, as bones are keyed: on sliders or on the board.
+    """Key the sliders or board handles that move the selected handles.
 
     Args:
         context: has the settings and the frame.
         rig: the character.
 
     Returns:
-        How many properties were keyed.
+        The number of keyed properties.
 
     Raises:
-        FaceError: a tweak is on that does not reach here.
+        FaceError: an active tweak does not reach this frame.
     """
     labels, live = sliders_of(context, rig), runtime.there(rig)
     led: list[str] = []

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a face's own space, in which controls are solved for, to where Blender shows it.
+"""Transformations from the space of the solver to the world.
 
-Between them lie the turns of the neck and head bones, what the user did to joints that the
-evaluator leaves alone, the rig's place and the file's axes and unit.
+They include the rotations of neck and head bones, the user's edits of joints that the evaluator
+does not write, the place of the rig, and axes and unit of the file.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ _LAST = (0.0, 0.0, 0.0, 1.0)  # row of an affine matrix
 
 
 class HeadTurns:
-    """What turns the head beside the face's own controls, at one moment.
+    """Rotations of the head beside the face's own controls, at one moment.
 
-    Holds Blender objects: it is made, used and dropped within one operator.
+    Holds Blender objects: it exists within one operator only.
     """
 
     def __init__(
@@ -109,9 +109,9 @@ class HeadTurns:
         return (result @ self._place.T)[:, :3]
 
     def of_joint(self, joint: int) -> Float:
-        """What a joint does now on top of what the controls ask for: float64[4, 4].
+        """The motion of a joint on top of its evaluated pose: float64[4, 4].
 
-        In the armature's axes; a turn of a joint goes on to all that hangs on it.
+        In axes of the armature. Children of the joint follow.
         """
         if joint not in self._known:
             parent = int(self._live.dna.joint_parents[joint])

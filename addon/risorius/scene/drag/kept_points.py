@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Points of a face that are kept on its control armature: pins, and handles by their state.
+"""Stored points of a face on its control armature: pins, and selected and hidden handles.
 
-Pins hold still while others are dragged. Handles are selected together, or hidden.
+Pins stay while other points are dragged. Handles can be selected together or hidden.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ PINS, SELECTED, HIDDEN = parts.PINS, parts.HANDLES_SELECTED, parts.HANDLES_HIDDE
 
 
 def of(rig: ArmatureObject, kind: str, counts: list[int]) -> list[Point]:
-    """The points of a face that are kept as one kind.
+    """The stored points of one kind.
 
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        counts: of the vertices of each mesh of its DNA; a point beyond them is another file's.
+        counts: number of vertices of each mesh of its DNA; points beyond belong to another file.
     """
     controls = parts.controls_of(rig)
     numbers = saved.wholes(controls, kind) if controls is not None else []
@@ -47,16 +47,16 @@ def put(rig: ArmatureObject, kind: str, points: Iterable[Point]) -> None:
 
 
 def toggle(rig: ArmatureObject, kind: str, point: Point, counts: list[int]) -> bool:
-    """Add a point, or take it out where it is there.
+    """Add a point, or remove it if it is stored.
 
     Args:
         rig: the character.
         kind: PINS, SELECTED or HIDDEN.
-        point: of it.
-        counts: as for `of`.
+        point: point of the character.
+        counts: see `of`.
 
     Returns:
-        Whether it is there now.
+        Whether it is stored now.
     """
     points = of(rig, kind, counts)
     if point in points:

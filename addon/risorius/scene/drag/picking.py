@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which vertex of which face lies under a ray through the scene."""
+"""The face and vertex under a ray through the scene."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ _THROUGH = 16  # objects that are drawn as wires or bounds, and looked through
 
 @dataclass
 class Hit:
-    """What a ray meets.
+    """The result of a ray.
 
     Attributes:
         rig: the character.
         point: mesh and vertex of its DNA.
         place: float64[3] of that vertex in the world.
-        is_handle: whether it is one of the handles that are offered.
+        is_handle: whether it is a visible handle.
     """
 
     rig: ArmatureObject
@@ -44,14 +44,14 @@ class Hit:
 
 
 def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
-    """The vertex of a face that a ray meets first, or None where it meets another thing.
+    """The vertex of the first face on a ray, or None if another object comes first.
 
     Args:
-        context: its scene is looked at, as the viewport evaluated it.
+        context: its scene as the viewport evaluated it.
         origin, direction: of the ray, in the world; the direction of length 1.
 
     Raises:
-        FaceError: the face is another file's, or has lost its DNA.
+        FaceError: the face is linked, or has lost its DNA.
     """
     met = _first(context, origin, direction)
     if met is None:
@@ -72,7 +72,8 @@ def under(context: Context, origin: Vector, direction: Vector) -> Hit | None:
 def _first(
     context: Context, origin: Vector, direction: Vector
 ) -> tuple[bpy.types.Object, Vector, int, Matrix] | None:
-    """The first object that is drawn as a solid: it, where, which polygon, where it stands."""
+    """The first object on a ray that is drawn as a solid: object, location, polygon, object
+    matrix."""
     depsgraph = context.evaluated_depsgraph_get()
     for _ in range(_THROUGH):
         met, place, _normal, index, item, matrix = context.scene.ray_cast(
@@ -95,7 +96,7 @@ def _nearest(
     place: NDArray[np.float64],
     index: int,
 ) -> Hit | None:
-    """The vertex of a face's mesh nearest to where a ray met it."""
+    """The vertex of a face's mesh nearest to the hit of a ray."""
     mesh, skin = int(item[parts.MESH]), Skin.of(context, rig, live)
     if mesh not in skin.surface.mesh_indices:
         return None
@@ -117,10 +118,10 @@ def computed(
     """Vertices of a mesh below all other modifiers: float64[V, 3] in the world.
 
     Args:
-        context: has the scene that is seen.
+        context: has the visible scene.
         rig, live: the character and its Runtime.
-        skin: of it.
-        mesh: its number in the DNA.
+        skin: skin of the character.
+        mesh: index of the mesh in the DNA file.
     """
     depsgraph, controls = context.evaluated_depsgraph_get(), parts.controls_there(rig)
     seen, maximum = controls.evaluated_get(depsgraph), parts.maximum_of(controls)
@@ -132,12 +133,12 @@ def computed(
 def places(
     context: Context, rig: ArmatureObject, live: runtime.Runtime, points: list[Point]
 ) -> list[NDArray[np.float64]]:
-    """Where points of a face are seen: float64[3] each, in the world.
+    """Visible places of points of a face: float64[3] each, in the world.
 
     Args:
-        context: has the scene that is seen.
+        context: has the visible scene.
         rig, live: the character and its Runtime.
-        points: mesh and vertex of each; those of another level of detail are left out.
+        points: mesh and vertex of each; points of another level of detail are left out.
     """
     if not points:
         return []

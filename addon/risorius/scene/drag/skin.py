@@ -23,14 +23,15 @@ _BESIDE = 0.02  # of the face's size: how far off the middle a mirrored vertex m
 
 @dataclass
 class Skin:
-    """A face's meshes in the scene. Holds Blender objects: it lives within one operator.
+    """A face's meshes in the scene. It holds Blender objects, so it exists within one operator
+    only.
 
     Attributes:
-        surface: the face in its own space, at the level of detail that is seen.
-        items: mesh object by its number in the DNA.
+        surface: the face in its own space, at the visible level of detail.
+        items: mesh index -> mesh object.
         size: of the face, in Blender units.
-        depsgraph: where it is seen.
-        pressed: float64[3] where the dragged vertex was seen at the press, or None.
+        depsgraph: dependency graph of the view.
+        pressed: float64[3], visible place of the dragged vertex at the press, or None.
     """
 
     surface: native.Surface
@@ -66,12 +67,12 @@ class Skin:
         self.depsgraph = context.evaluated_depsgraph_get()
 
     def seen(self, mesh: int) -> Float | None:
-        """Vertices of a mesh as Blender shows them: float64[V, 3] in the world.
+        """Visible vertices of a mesh: float64[V, 3] in the world.
 
-        None where it is hidden, or what lies above the armature makes other vertices.
+        None if it is hidden, or a modifier after the armature changes its vertices.
 
         Args:
-            mesh: its number in the DNA.
+            mesh: index of the mesh in the DNA file.
         """
         data, place = self._evaluated(mesh)
         if data is None:
@@ -88,11 +89,11 @@ class Skin:
         return place[:3, :3] @ np.array(data.vertices[point[1]].co, np.float64) + place[:3, 3]
 
     def corners(self, mesh: int, polygon: int) -> list[tuple[int, Float]] | None:
-        """The vertices of a polygon with their places in the world; None as of `seen`.
+        """The vertices of a polygon with their places in the world; None as in `seen`.
 
         Args:
-            mesh: its number in the DNA.
-            polygon: index of it in the evaluated mesh.
+            mesh: index of the mesh in the DNA file.
+            polygon: index in the evaluated mesh.
         """
         data, place = self._evaluated(mesh)
         if data is None or not 0 <= polygon < len(data.polygons):
@@ -113,10 +114,10 @@ class Skin:
         return (data if same else None), np.array(seen.matrix_world)
 
     def mirrored(self, point: Point) -> Point | None:
-        """The vertex that lies where a mirror shows one, on the face at rest; None without one.
+        """The mirrored vertex of a vertex on the face at rest; None if there is none.
 
         Args:
-            point: mesh and vertex; one of the middle is its own.
+            point: mesh and vertex; a vertex of the middle mirrors itself.
         """
         at = self._rest(point[0])[point[1]] * (-1.0, 1.0, 1.0)
         best: tuple[float, Point] | None = None

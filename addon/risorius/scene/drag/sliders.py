@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sliders of a face as something to solve for: what each does to the face that is seen."""
+"""The sliders of a face as unknowns of the solver: their effect on the visible face."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ _LEAST = 1e-3  # of a slider's change that must come through
 
 @dataclass
 class Sliders:
-    """Sliders and what is seen of them, as they were when a drag began.
+    """Sliders and their visible effect at the start of a drag.
 
     Attributes:
-        before: property name -> its value, to give it back.
+        before: property name -> value to restore.
         start: float64[R] the sliders.
         seen: float32[R] the raw controls of the face, with layers and eye bones.
-        gain: float64[R] how much of a slider's change is seen.
-        free: bool[R] which can be moved.
+        gain: float64[R], visible share of a slider's change.
+        free: bool[R] sliders that can move.
         low, high: float64[R] the limits of `seen`.
-        linked: (leader, follower) indices of sides that are linked.
-        places: bone -> place of each handle of a face board that leads; empty where none does.
+        linked: (leader, follower) indices of linked sides.
+        places: bone -> place of each handle of a leading face board; empty without one.
     """
 
     before: dict[str, float]
@@ -94,16 +94,16 @@ def read(rig: ArmatureObject, live: runtime.Runtime, depsgraph: Depsgraph) -> Sl
 def write(
     rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
 ) -> list[str]:
-    """Set the sliders so that the face shows raw controls.
+    """Set the sliders so that the face shows given raw controls.
 
     Args:
         rig: the character.
         live: its Runtime.
-        sliders: as they were when the drag began.
+        sliders: sliders at the start of the drag.
         raw: float32[R].
 
     Returns:
-        The names of those that differ from what they were.
+        The names of sliders that differ from the start.
     """
     controls = parts.controls_there(rig)
     if sliders.places:
@@ -128,7 +128,7 @@ def write(
 def _write_board(
     rig: ArmatureObject, live: runtime.Runtime, sliders: Sliders, raw: NDArray[np.float32]
 ) -> list[str]:
-    """`write` where the face board leads: it comes as near as it can, from where it stood."""
+    """`write` for a leading face board: it moves as near as possible, from its start."""
     board.put_places(parts.controls_there(rig), live, sliders.places)
     values = sliders.values(raw)
     moved = {
@@ -141,18 +141,18 @@ def _write_board(
 
 
 def restore(rig: ArmatureObject, sliders: Sliders) -> None:
-    """Give all sliders what they had.
+    """Restore all sliders.
 
     Args:
         rig: the character.
-        sliders: as they were when the drag began.
+        sliders: sliders at the start of the drag.
     """
     sides.restore(rig, sides.Held(sliders.before, sliders.places))
     parts.controls_there(rig).update_tag()
 
 
 def mirrored_indices(live: runtime.Runtime) -> NDArray[np.int64]:
-    """int64[R]: the partner of each control in a mirror; itself where it has none."""
+    """int64[R]: the mirrored partner of each control, or itself."""
     where = {label: i for i, label in enumerate(live.labels)}
     partner = native.regions().mirrored
     return np.array([where.get(partner(n), i) for n, i in where.items()], np.int64)
@@ -171,10 +171,10 @@ def _gains(
     maximum: float,
     start: Float,
 ) -> Float:
-    """What comes through the layers of a small change of each slider: 1 without layers.
+    """The share of a small change of each slider that passes the layers: 1 without layers.
 
-    Each is tried alone: of two that exclude each other, as looking left and right, a rule of the
-    layers lets only one through.
+    Each slider is tried alone, because the layers let only one of two opposites pass, such as
+    looking left and right.
     """
     gain = np.ones(len(start))
     if not layers.has_any(seen.original):

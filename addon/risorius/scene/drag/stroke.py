@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One drag of a face, from the press to the release: targets in the scene to sliders.
 
-Each target is solved for from the pose at the press, so a face is what the cursor's place makes it,
-whatever way the cursor took.
+Each target is solved from the pose at the press, so the result depends on the place of the pointer
+and not on its path.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ _SMALL = 0.02  # of the largest change: what is smaller is not worth a key
 
 @dataclass(frozen=True)
 class Options:
-    """How a drag is solved.
+    """Options of a drag.
 
     Attributes:
-        symmetric: the mirrored point goes the mirrored way.
-        method: "near", by few sliders, those that belong to the place of the points before others,
-            "least_squares", by all sliders, or "transpose".
-        single: only the one control that does it best moves; with `symmetric` its partner too.
-        choice: which one: 0 is the best, 1 the next.
+        symmetric: move the mirrored point too.
+        method: "near": few sliders that belong to the place; "least_squares": all sliders; or
+            "transpose".
+        single: move only the best control; with `symmetric` its partner too.
+        choice: 0: the best control, 1: the next.
         region: only controls of the region of the point.
-        others: points that go the same way as the dragged one.
+        others: points that move with the dragged one.
     """
 
     symmetric: bool = False
@@ -57,14 +57,14 @@ class Options:
 
 @dataclass
 class _Anchors:
-    """The points of a drag as they were at the press.
+    """The points of a drag at the press.
 
     Attributes:
-        points: the dragged one, others that go with it, their mirrors, then pins.
-        mirrored: of each point that is pulled, whether it goes the mirrored way; pins are not.
+        points: the dragged point, points that move with it, their mirrors, then pins.
+        mirrored: for each pulled point, whether it is a mirror; pins are left out.
         rest: float64[P, 3] in the file's space.
         world: float64[P, 3] in the scene.
-        maps: float64[P, 3, 3] from directions of the file to those of the world.
+        maps: float64[P, 3, 3] from directions of the file to directions of the world.
     """
 
     points: list[Point]
@@ -76,16 +76,16 @@ class _Anchors:
 
 @dataclass
 class Stroke:
-    """A drag that is going on. Made by `begin`; it ends with `finish` or `restore`.
+    """A running drag. `begin` makes it; `finish` or `restore` ends it.
 
-    Holds Blender objects: it lives within one operator.
+    It holds Blender objects, so it exists within one operator only.
 
     Attributes:
         rig, live: the character and its Runtime.
-        point: (mesh, vertex) that is dragged.
-        options: how; may change while it goes on.
-        raw: float32[R] what the face shows now.
-        best: controls that do it alone, best first: (index, value, remaining distance).
+        point: dragged (mesh, vertex).
+        options: options; they may change during the drag.
+        raw: float32[R], raw controls of the face now.
+        best: single controls for this drag, best first: (index, value, remaining distance).
     """
 
     rig: ArmatureObject
@@ -110,7 +110,7 @@ class Stroke:
 
     @property
     def dragged_region(self) -> str:
-        """The region whose control moves the point most."""
+        """The region of the control that moves the point most."""
         strongest = int(np.argmax(np.linalg.norm(self.reach, axis=0) * self.state.free))
         return native.regions().of_slider(self.live.labels[strongest])
 
@@ -132,14 +132,14 @@ class Stroke:
         return at
 
     def finish(self, context: Context, target: Float, view: Float | None = None) -> list[str]:
-        """Bring the point to its place, by the controls that count, and insert keys.
+        """Move the point to its target with the relevant controls, and insert keys.
 
         Args:
             context: has the settings for keys.
-            target, view: as for `to`.
+            target, view: see `to`.
 
         Returns:
-            The names of the sliders that moved.
+            The names of the moved sliders.
         """
         self.to(context, target, view)
         change = np.abs(self.raw - self.state.seen)
@@ -163,7 +163,7 @@ class Stroke:
         return moved
 
     def restore(self, context: Context) -> None:
-        """Give the face back what it was at the press. Args: context  its view layer is shown."""
+        """Restore the face at the press. Args: context with the visible view layer."""
         sliders.restore(self.rig, self.state)
         self.raw = self.state.seen
         self.skin.show(context)
@@ -323,16 +323,16 @@ _REFUSED = told("Blender lets nobody write to this override: make it fully edita
 
 
 def begin(context: Context, rig: ArmatureObject, point: Point, options: Options) -> Stroke:
-    """Take hold of a point of a face.
+    """Begin to drag a point of a face.
 
     Args:
-        context: has the scene that is seen.
+        context: has the visible scene.
         rig: the character.
         point: (mesh, vertex) of its DNA.
-        options: how it is dragged.
+        options: options of the drag.
 
     Raises:
-        FaceError: a face that cannot be dragged now, or a point that nothing moves.
+        FaceError: the face cannot be dragged now, or nothing moves the point.
     """
     live = _usable(context, rig)
     depsgraph = context.evaluated_depsgraph_get()

@@ -33,11 +33,11 @@ from ..upkeep import applied_transforms, bone_edits, duplicates, migrations, rep
 
 @dataclass
 class _Work:
-    """What the handlers are at.
+    """State of the handlers.
 
     Attributes:
-        busy: whether an update is followed now.
-        rendering: since a render began.
+        busy: whether an update is being handled.
+        rendering: whether a render runs.
     """
 
     busy: bool = False
@@ -45,8 +45,8 @@ class _Work:
 
 
 _work = session.keep("handlers.work", _Work, ("unregister",))
-# Session uids: of the objects that were seen; of control armatures that are not new; of characters
-# that were mended at the last update.
+# Session uids: of known objects; of known control armatures; of characters that were repaired at
+# the last update.
 _objects = session.value("handlers.objects", frozenset[int](), ("undo", "load"))
 _faces = session.value("handlers.faces", frozenset[int](), ("unregister",))
 _mended: set[int] = session.keep("handlers.mended", set, ("load",))
@@ -75,7 +75,8 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: Depsgraph | None = None) -
 
 
 def _is_rendered() -> bool:
-    """Whether the frame that changes is a render's: beside one the interface has its own."""
+    """Whether the changing frame belongs to a render; the interface changes frames of its own
+    beside it."""
     if not _work.rendering or not bpy.app.is_job_running("RENDER"):
         return bool(_work.rendering)
     return threading.current_thread() is not threading.main_thread()
@@ -108,7 +109,7 @@ def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
     controls_ahead.note_edit()
     joint_readings.note_edit()
     board.note_edit()
-    # While a render runs beside the interface, only its own frames are written.
+    # While a render runs beside the interface, only frames of the render are written.
     if _work.busy or bpy.app.is_job_running("RENDER") or native.problem():
         return
     if evaluate.is_paused():
@@ -154,7 +155,7 @@ def _note_mended(rig: ArmatureObject) -> None:
 
 
 def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
-    # Their number alone does not tell: as many may go as come in one step.
+    # Compare the objects and not their number: one step may remove as many as it adds.
     known = _objects.now
     seen = (u.id.original for u in updates if isinstance(u.id, bpy.types.Object))
     new = any(item is not None and item.session_uid not in known for item in seen)
@@ -175,7 +176,7 @@ def _notice_copies(updates: Iterable[bpy.types.DepsgraphUpdate]) -> None:
 
 @persistent
 def _imported(*_arguments: object) -> None:
-    """After Append, before its undo step is made: Blender 4.3 and later tell of it."""
+    """Called after Append and before its undo step, in Blender 4.3 and later."""
     if not native.problem():
         _tidy_new()
 
@@ -189,7 +190,7 @@ def _tidy_new() -> None:
 
 
 def _edited(depsgraph: Depsgraph) -> list[ArmatureObject]:
-    """The characters that the updates concern: by their controls, their body or the camera."""
+    """The characters whose controls, body or camera were updated."""
     armatures, actions, bones_edited, camera_moved = set(), set(), False, False
     camera = depsgraph.scene.camera
     found = (u.id.original for u in depsgraph.updates if u.id is not None)
@@ -273,10 +274,10 @@ def _loaded(*_arguments: object) -> None:
 
 @persistent
 def _restored(*_arguments: object) -> None:
-    """After load, undo and redo: what was written before says nothing about what is there.
+    """After load, undo and redo: forget the last written values, which no longer apply.
 
-    Nothing is read here: until the next update the pose bones of objects that undo brought back
-    point to bones that are no more, and Blender dies of a look at them.
+    Nothing is read here: until the next update, pose bones of restored objects point to freed
+        bones, and reading them crashes Blender.
     """
     session.end("undo")
     joint_readings.note_edit()
@@ -297,7 +298,7 @@ def _undone(*_arguments: object) -> None:
 
 @persistent
 def _before_restoring(*_arguments: object) -> None:
-    """Before load, undo and redo: what is freed by them is let go."""
+    """Before load, undo and redo: release references to data that they free."""
     session.end("free")
 
 
@@ -323,7 +324,7 @@ def _before_save(*_arguments: object) -> None:
 
 @persistent
 def _saved(*_arguments: object) -> None:
-    """What no file shall have, the session has again."""
+    """After a save: restore the state that files must not contain."""
     if native.problem():
         return
     ordinary.take_off(parts.rigs())
@@ -381,7 +382,7 @@ def _there() -> list[tuple[str, Any]]:
 
 
 def register() -> None:
-    """Add the handlers, and bring up what is already there."""
+    """Add the handlers, and update the characters of the open file."""
     for name, handler in _there():
         present = getattr(bpy.app.handlers, name)
         if handler not in present:

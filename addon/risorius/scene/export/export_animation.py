@@ -32,11 +32,11 @@ from .lent_names import Loans
 
 @dataclass(frozen=True)
 class ShipOptions:
-    """What goes out.
+    """Options of an export.
 
     Attributes:
         start, end, step: frames.
-        lod: level of detail; -1 for the one that the viewport shows.
+        lod: level of detail; -1: the level in the viewport.
         wanted: some of "BONES", "SHAPES".
         all_shapes: keep shape keys that the range does not use.
     """
@@ -55,19 +55,19 @@ def sampled(
     """Sample characters for `copies` or `clip`; a generator like sampling.sample.
 
     Args:
-        context: scene and view layer that are sampled.
+        context: scene and view layer to sample.
         rigs: deforming armatures of the characters.
         options: ShipOptions with the range of frames, its step and the level of detail.
 
     Yields:
-        The share that is done, 0 to 1.
+        The finished share, 0 to 1.
 
     Returns:
         (rig, level, Samples) of each.
 
     Raises:
-        BakeError: a character is baked: what it plays is no longer what its controls say.
-        ValueError: the range is none.
+        BakeError: a character is baked, so its controls no longer give its animation.
+        ValueError: the range has no frame.
     """
     for rig in rigs:
         if bake_face.baked(rig) == bake_face.RESULT:
@@ -87,16 +87,16 @@ def copies(
     characters: Sequence[tuple[ArmatureObject, int, sampling.Samples]],
     options: ShipOptions,
 ) -> Iterator[tuple[Override, Loans]]:
-    """Baked copies of characters, alone in a scene that is shown meanwhile.
+    """Context manager: baked copies of characters, alone in a temporary visible scene.
 
     Args:
-        context: with the window whose scene is exchanged.
+        context: with the window whose scene is replaced.
         characters: from `sampled`.
         options: ShipOptions.
 
     Yields:
-        The context override for an exporter, as a dict, and the Loans of names: the copies bear the
-        names that the file shall have, and whoever has them waits under others.
+        The context override for an exporter, as a dict, and the Loans of names: the copies have the
+            names for the file, and the originals temporarily have other names.
     """
     window, user = context.window, context.scene
     before, loans = _everything(), Loans()
@@ -133,7 +133,7 @@ def _stage(user: bpy.types.Scene, frames: NDArray[np.float64]) -> bpy.types.Scen
 
 
 def _name(rig: ArmatureObject) -> str:
-    """What a character is called in a file."""
+    """The name of a character in an exported file."""
     return rig.name.removesuffix("_rig")
 
 
@@ -231,7 +231,7 @@ def _show(item: bpy.types.Object) -> None:
 
 
 def _forget(item: bpy.types.Object) -> None:
-    """Take off what makes an object a part of a character."""
+    """Remove the marks of a character from an object."""
     for name in list(item.keys()):
         if name.startswith(("risorius_", "dna_")) or name in (parts.MAPS, parts.CHANNELS):
             del item[name]
@@ -247,7 +247,7 @@ def _everything() -> dict[str, set[bpy.types.ID]]:
 
 
 def _remove_all_but(before: Mapping[str, set[bpy.types.ID]]) -> None:
-    """Remove what was made since: by us, and by an exporter that failed half-way."""
+    """Remove datablocks that were made since, also by a failed exporter."""
     new = [
         item
         for kind, there in before.items()
@@ -266,18 +266,18 @@ def clip(
     origin: float,
     maps: bool = False,
 ) -> native.Clip:
-    """The raw controls of a range, and how neck and head were turned.
+    """A clip of the raw controls of a range and of the rotations of neck and head.
 
     Args:
         rig: deforming armature.
-        level: of detail, for the maps.
-        samples: its Samples.
+        level: level of detail, for the maps.
+        samples: Samples of the character.
         rate: frames per second of the scene.
-        origin: the frame of the scene that is the clip's second 0; an import puts it there again.
+        origin: the scene's frame of second 0 of the clip.
         maps: add the values of the animated maps, each by its name in the DNA.
 
     Returns:
-        risorius.Clip, names as in the DNA (Blender's where the DNA has one twice).
+        risorius.Clip, with names of the DNA file (Blender's name if the DNA file has a name twice).
     """
     live, names = runtime.there(rig), []
     for label, name in zip(live.labels, live.dna.raw_control_names, strict=True):

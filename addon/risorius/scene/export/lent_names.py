@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names that datablocks lend to copies: a file for another program bears the user's own names."""
+"""Names lent to copies, so that an exported file has the user's own names."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ...logic.base.sentences import told
 
 
 class Loans:
-    """What was lent; `give_back` when the copies are gone."""
+    """The lent names; call `give_back` after removing the copies."""
 
     def __init__(self) -> None:
         self._lent: list[tuple[bpy.types.ID, str]] = []
         self._taken: set[tuple[str, str]] = set()
 
     def take(self, kind: str, copy: bpy.types.ID, name: str) -> None:
-        """Name a copy; who has the name waits under another, unless it is a copy too.
+        """Name a copy. An original with this name temporarily gets another one.
 
         Args:
             kind: of datablocks, as in bpy.data.
             copy: a new datablock.
-            name: that it shall have.
+            name: its name in the file.
         """
         holder = next(
             (x for x in getattr(bpy.data, kind) if x.name == name and x.library is None), None
@@ -47,12 +47,13 @@ class Loans:
 
 @contextmanager
 def images_as_files() -> Iterator[None]:
-    """All images of the file bear names of files meanwhile.
+    """Context manager: give all images of the file names that are valid file names.
 
-    Blender's USD exporter writes an image that has no path under its name, `../` and all.
+    Blender's USD exporter writes an image without a path under its name, even if this contains
+    `../`.
 
     Raises:
-        FaceError: an image of a linked file has such a name, which cannot be changed here.
+        FaceError: a linked image has such a name and cannot be renamed here.
     """
     names = native.part("files.names")
     odd = [image for image in bpy.data.images if not names.is_file_name(image.name)]

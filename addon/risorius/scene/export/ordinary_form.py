@@ -19,16 +19,16 @@ from ..skinning import conditions
 _LOOK_AGAIN = 0.5  # seconds between two looks whether a dialog is still open
 
 DIALOG, GLTF = "dialog", "gltf"  # who asks for the form of files
-# Who asks -> names of the deforming armatures that are held.
+# Reader -> names of its held deforming armatures.
 _held: dict[str, list[str]] = session.table("ordinary_form.held", ("load",))
 _drawing = session.value("ordinary_form.drawing", cast("object", None), ("quit",))
 
 
 def begin(reader: str) -> None:
-    """Give all faces the form of files until `end`.
+    """Give all faces the form of files until `end` is called.
 
     Args:
-        reader: DIALOG or GLTF; who asks twice is counted once.
+        reader: DIALOG or GLTF; a second call of a reader has no effect.
     """
     if reader in _held:
         return
@@ -38,7 +38,7 @@ def begin(reader: str) -> None:
         conditions.hold_ordinary(rig, on=True)
     _bring_up()
     if reader == GLTF and not bpy.app.timers.is_registered(_let_go):
-        # An exporter that fails does not say that it has ended.
+        # A failing exporter does not report its end.
         bpy.app.timers.register(_let_go, first_interval=_LOOK_AGAIN)
 
 
@@ -80,7 +80,8 @@ def unregister() -> None:
 
 
 def _drawn() -> None:
-    """A file browser is drawn, in which nothing can be edited: a timer does it."""
+    """Called when a file browser is drawn. Drawing code must not edit data, so a timer does the
+    work."""
     space = cast("bpy.types.Space | None", current_context().space_data)
     if _exports(space) and not bpy.app.timers.is_registered(_watch):
         bpy.app.timers.register(_watch, first_interval=0.0)

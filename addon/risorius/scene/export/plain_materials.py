@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials that every exporter understands: one plain shader with one image for each input.
 
-Exporters look for a single image at each input of a Principled shader. What a node tree paints is
-baked, by Cycles and on the CPU, into such images; an image that reaches an input unchanged stays
-that image. Relief that nodes paint is left out: it is finer than the images are. Works on the
-copies of an export, whose materials, meshes and scene go again.
+Exporters expect a single image at each input of a Principled shader. Cycles bakes node trees into
+such images on the CPU. An image that reaches an input unchanged stays that image. Relief from nodes
+is left out, because it is finer than the images. All of this happens on the temporary copies of an
+export.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .lent_names import Loans
 _INPUTS = {"color": ("Base Color", "Color"), "alpha": ("Alpha",), "roughness": ("Roughness",)}
 _MASKS = ("alpha", "roughness")  # baked together
 _SOCKETS = {"color": "Base Color", "roughness": "Roughness", "normal": "Normal"}
-# Numbers that glTF and USD hold as well; what feeds them is left out.
+# Numbers that glTF and USD support too; textures on these inputs are left out.
 _NUMBERS = ("Metallic", "Specular IOR Level", "IOR", "Coat Weight", "Coat Roughness", "Coat IOR")
 _FILM = 0.05  # opacity of a wet film: it must show the iris; most programs fade its shine with it
 _LAYER = "risorius_flat"
@@ -41,19 +41,19 @@ _WET = 0.08  # roughness of such a film
 
 @dataclass
 class _Flat:
-    """A material on its way.
+    """A material during its conversion.
 
     Attributes:
-        material: what the user made.
-        name: that it had before it lent it.
-        work: a copy of it that is baked; None where it has no nodes.
-        users: (mesh object, slot number) that show it.
-        shader: the node of the copy that gives the colour; None for a film.
-        clear: light passes somewhere.
+        material: the user's material.
+        name: its name before lending.
+        work: a copy for baking; None if it has no nodes.
+        users: (mesh object, slot number) with this material.
+        shader: the shader node of the copy; None for a film.
+        clear: True: transparent in places.
         sources: input -> shader_inputs.Source.
-        images: input -> image, taken over or baked; "normal" too.
-        baked: inputs that are baked.
-        mean: the roughness becomes one number, because faces lie on each other in the UV map.
+        images: input -> reused or baked image, including "normal".
+        baked: inputs to bake.
+        mean: True: roughness becomes one number, because polygons overlap in the UV map.
     """
 
     material: bpy.types.Material
@@ -74,13 +74,13 @@ def flatten(override: Override, loans: Loans, size: int) -> Generator[float, Non
     Args:
         override: context override of the export, from export_animation.copies.
         loans: lent_names.Loans for the names of the materials.
-        size: pixels of a side of what is baked.
+        size: pixels of a side of baked images.
 
     Yields:
-        The share that is done, 0 to 1.
+        The finished share, 0 to 1.
 
     Raises:
-        FaceError: Cycles is needed and not there, or a mesh has no room for a UV map.
+        FaceError: Cycles is missing, or a mesh has no room for a UV map.
     """
     items = [o for o in override["scene"].objects if o.type == "MESH"]
     for item in items:
@@ -153,7 +153,7 @@ def _read(flat: _Flat) -> None:
 
 
 def _lay_out(flat: _Flat) -> None:
-    """Where the pictures of a material lie on its meshes; meshes get a layer where that is new."""
+    """Choose the UV layer for baking a material; meshes get a new layer if needed."""
     if not flat.baked:
         return
     users = [(item, *_corners(item, slot)) for item, slot in flat.users]
@@ -221,7 +221,7 @@ def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.fl
 
 
 def _keep_one_layout(mesh: bpy.types.Mesh) -> None:
-    """What was baked by becomes the UV map that renders show."""
+    """Make the UV layer of the bake the active UV map."""
     layer, shown = mesh.uv_layers.get(_LAYER), _shown_layer(mesh)
     if layer is None:
         return
@@ -267,7 +267,7 @@ def _bake(
 
 
 def _prepare(stage: bpy.types.Scene, size: int) -> None:
-    """Cycles on the CPU, one sample: what is baked has no light in it."""
+    """Set up Cycles on the CPU with one sample, because baked inputs contain no light."""
     try:
         stage.render.engine = "CYCLES"  # pyright: ignore[reportAttributeAccessIssue]
     except TypeError:
@@ -288,7 +288,7 @@ def _shown_on(item: MeshObject, flats: Iterable[_Flat]) -> list[_Flat]:
 
 
 def _new_image(flat: _Flat, name: str, size: int) -> bpy.types.Image:
-    """An empty image; what is baked coarsely is smooth or will be one number."""
+    """An empty image for a bake; smooth inputs and single numbers get a small one."""
     if name != "color" and "alpha" not in flat.baked:
         size = 64 if flat.mean else max(size // 4, 64)
     image = bpy.data.images.new(f"{flat.name}_{name}", size, size, alpha=True)
@@ -344,7 +344,7 @@ def _bake_one(override: Override, items: Iterable[MeshObject], item: MeshObject)
 
 
 def _read_back(flat: _Flat, color: bpy.types.Image | None, masks: bpy.types.Image | None) -> None:
-    """The images of a material, of what was baked."""
+    """Split baked images into the images of a material."""
     values = _pixels(masks) if masks is not None else np.zeros((0, 0, 4), np.float32)
     if color is not None:
         _finish_color(color, values[..., 0] if "alpha" in flat.baked else None)
@@ -390,8 +390,8 @@ def _pixels(image: bpy.types.Image) -> NDArray[np.float32]:
 
 
 def _build(flat: _Flat, loans: Loans, files: list[str]) -> bpy.types.Material:
-    """The plain material of one of the user's, under its name; adds its images' files to those
-    of the others."""
+    """Make the plain material for a user's material, with its name; add its image files to
+    `files`."""
     user = flat.material
     material = bpy.data.materials.new(flat.name)
     loans.take("materials", material, flat.name)
@@ -411,7 +411,7 @@ def _build(flat: _Flat, loans: Loans, files: list[str]) -> bpy.types.Material:
 
 
 def _plain_look(flat: _Flat, shader: Node) -> None:
-    """A film, or what the solid view shows of a material that has no shader."""
+    """Give a material without a shader the look of a film or of the solid view."""
     color = tuple(flat.material.diffuse_color)
     if flat.clear:
         shader.inputs["Base Color"].default_value = (0.0, 0.0, 0.0, 1.0)
@@ -451,14 +451,14 @@ def _take_images(flat: _Flat, material: bpy.types.Material, shader: Node, files:
 
 
 def write_images(scene: bpy.types.Scene, folder: Path) -> int:
-    """The images of a stage as files, for formats that hold no materials.
+    """Write the images of a stage as files, for formats without materials.
 
     Args:
-        scene: the export's, after `flatten`.
-        folder: made where an image needs it.
+        scene: scene of the export, after `flatten`.
+        folder: created if an image needs it.
 
     Returns:
-        How many files were written.
+        The number of written files.
     """
     slots = [s for o in scene.objects if o.type == "MESH" for s in o.material_slots if s.material]
     trees: set[NodeTree] = {s.material.node_tree for s in slots if s.material} - {None}

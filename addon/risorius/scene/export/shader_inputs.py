@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a node tree gives to each input of a plain shader: a number, one image, or more than that.
+"""Source of each input of a plain shader in a node tree: a number, one image, or a network to bake.
 
-Animated maps rest at 0 here: a file for another program has one picture of a face, the neutral.
+Animated maps are 0 here: an exported file has the look of the neutral face.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ _CLEAR = ("BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION")
 
 @dataclass(frozen=True)
 class Source:
-    """Where an input's values come from.
+    """Source of the values of an input.
 
     Attributes:
-        value: of an input that nothing feeds, else None.
-        node: the one image texture that feeds it unchanged, or None.
-        channel: of that image: "Color" or "Alpha".
-        socket: what has to be baked, or None.
+        value: value of an unconnected input, else None.
+        node: the image texture that is connected unchanged, or None.
+        channel: channel of that image: "Color" or "Alpha".
+        socket: socket to bake, or None.
     """
 
     value: float | tuple[float, ...] | None = None
@@ -62,7 +62,7 @@ def rest_maps(tree: NodeTree) -> None:
 
 
 def alike(tree: NodeTree, other: NodeTree) -> bool:
-    """Whether two trees paint the same, as those of an eye and of its iris that nobody edited.
+    """Whether two trees give the same result, such as the unedited trees of an eye and its iris.
 
     Args:
         tree: nodes of a material.
@@ -111,14 +111,14 @@ def _upstream(socket: Socket) -> list[Node]:
 
 
 def source(shader: Node, *names: str) -> Source:
-    """Where the values of a shader's input come from.
+    """Find the source of the values of a shader's input.
 
     Args:
         shader: the node.
-        names: of the input in versions of Blender; the first that the node has is taken.
+        names: names of the input in different Blender versions; the first existing one is used.
 
     Returns:
-        Source; an empty one where the node has none of these inputs.
+        Source; an empty one if the node has none of these inputs.
     """
     socket = next((shader.inputs[n] for n in names if n in shader.inputs), None)
     if socket is None:
@@ -147,7 +147,7 @@ def normal_image(shader: Node) -> Node | None:
 
 
 def by_place(socket: Socket) -> bool:
-    """Whether what is baked depends on where the surface is, and not on its UV map alone."""
+    """Whether a baked value depends on the location of the surface and not on its UV map alone."""
     for node in [socket.node, *(n for s in socket.node.inputs for n in _upstream(s))]:
         if node.type in ("ATTRIBUTE", "NEW_GEOMETRY", "VERTEX_COLOR"):
             return True
@@ -164,7 +164,7 @@ def _plain(node: Node) -> bool:
 
 
 def _feeding(socket: Socket) -> Socket | None:
-    """The output that feeds an input, past mixes that mix nothing in; or None."""
+    """The output connected to an input, skipping mix nodes without effect; or None."""
     while socket.is_linked:
         feeding = socket.links[0].from_socket
         node = feeding.node

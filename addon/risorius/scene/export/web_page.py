@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face as a web page: its file with the edits, its textures, what it plays and says."""
+"""A face as a web page: its file with edits, textures, animation and sound."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..base.blender_types import ArmatureObject
 
 @dataclass(frozen=True)
 class Sound:
-    """A sound strip of the sequencer, as a page plays it.
+    """A sound strip of the sequencer for a page.
 
     Attributes:
         path: of the sound file.
-        offset: seconds from the first frame that is exported to the strip's own begin; below 0
-            where the strip has begun before.
+        offset: seconds from the first exported frame to the start of the strip; below 0 if the
+            strip starts earlier.
     """
 
     path: Path
@@ -30,7 +30,7 @@ class Sound:
 
 
 def first_sound(scene: bpy.types.Scene, start: float, end: float, rate: float) -> Sound | None:
-    """The sound strip that is heard first in a range of frames; None where there is none.
+    """The first audible sound strip in a range of frames, or None.
 
     Args:
         scene: has the sequencer.
@@ -61,11 +61,11 @@ def page(
     Args:
         rig: deforming armature.
         content: bytes of its DNA file.
-        clip: what it plays, of raw controls; None: nothing.
-        sound: what is heard with the clip.
+        clip: clip of raw controls to play; None: nothing.
+        sound: sound of the clip.
 
     Raises:
-        FaceError: the build of Risorius has no page in it, or the face cannot be shown.
+        FaceError: this build of Risorius has no page, or the face cannot be shown.
     """
     web = native.part("web")
     dna = native.module().load(content)

@@ -12,10 +12,10 @@ _SECTION = struct.Struct("<16sqq")  # of a crate's table of contents: name, firs
 
 
 def is_cut(path: Path) -> bool:
-    """Whether a part of a file is missing, by what its format says of itself.
+    """Whether the end of a file is missing, by the sizes stored in its format.
 
     Args:
-        path: of a file that an exporter has closed; of a format that tells nothing it is False.
+        path: path of a closed file. For formats without stored sizes the result is False.
 
     Raises:
         OSError: it cannot be read.
@@ -38,7 +38,7 @@ def is_cut(path: Path) -> bool:
 
 
 def _contents_cut(table: bytes, size: int) -> bool:
-    """Whether a section of a crate, or the table of them, ends beyond the file."""
+    """Whether a section of a USD crate file, or its table of sections, ends beyond the file."""
     count = int.from_bytes(table[:8], "little")
     if not 0 < count <= (len(table) - 8) // _SECTION.size:
         return True

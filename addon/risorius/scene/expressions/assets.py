@@ -41,8 +41,8 @@ def groups() -> dict[str, list[native.Expression]]:
 def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]:
     """Make a pose asset of every expression that this face can show.
 
-    An asset holds all sliders of the regions that its expression moves, so that it looks the same
-    whatever the face did before; one that is there already is made anew, unless it was edited.
+    An asset contains all sliders of the regions of its expression, so that the result does not
+    depend on the earlier pose. An existing unedited asset is made again.
 
     Args:
         rig: the character.
@@ -64,14 +64,14 @@ def make_assets(rig: ArmatureObject) -> tuple[list[bpy.types.Action], list[str]]
 
 
 def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.Action:
-    """Make the pose asset of an expression, with its picture where there is one.
+    """Make the pose asset of an expression, with its picture if it exists.
 
     Args:
         rig: the character.
-        expression: one that the face can show.
+        expression: an expression that the face can show.
 
     Returns:
-        The action; one of the same name that nobody edited is replaced.
+        The action; an unedited action of the same name is replaced.
     """
     pose = poses.pose_for(runtime.there(rig), expression)
     clip = native.module().Clip(list(pose), [[value] for value in pose.values()])
@@ -94,7 +94,7 @@ def make_asset(rig: ArmatureObject, expression: native.Expression) -> bpy.types.
         poses.held_by(expression, poses.weights_for(runtime.there(rig), expression))
     ):
         asset.tags.new(region, skip_if_exists=True)
-    # On the asset's data too: a shelf knows that of other files' assets without loading them.
+    # Store it in the asset data too, because a shelf reads these without loading the file.
     action[MARK] = asset[MARK] = native.part("expressions").text_of(expression)
     give_picture(action, picture_of(rig, expression))
     return action
@@ -107,7 +107,7 @@ def _named(name: str) -> bpy.types.Action | None:
 
 
 def picture_of(rig: ArmatureObject, expression: native.Expression) -> Path:
-    """The file of an expression's picture on a character, whether it is there or not.
+    """The file of an expression's picture on a character, whether it exists or not.
 
     Args:
         rig: the character.
@@ -125,7 +125,7 @@ def give_picture(action: bpy.types.Action, path: Path) -> bool:
         path: of the PNG file.
 
     Returns:
-        Whether there was such a picture.
+        Whether the picture exists.
     """
     try:
         image = native.part("files.png").read_png(path.read_bytes())
@@ -151,7 +151,7 @@ def catalog_id(group: str) -> uuid.UUID:
 
 
 def write_catalogs(wanted: Iterable[str]) -> list[str]:
-    """Name the catalogues in the file beside the .blend, where Blender keeps them.
+    """Write the catalogues into Blender's catalogue file beside the .blend.
 
     Args:
         wanted: groups of expressions.

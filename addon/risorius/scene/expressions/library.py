@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where expressions come from: Risorius, a folder shared between files, and this file.
+"""Sources of expressions: Risorius, a shared folder, and this file.
 
 A library is a folder with a TOML file for each expression, in the form of risorius.expressions, and
-its picture beside it. Those of this file are pose assets that bear the same text.
+its picture beside it. Expressions of this file are pose assets with the same text.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class LibraryError(FaceError):
 
 
 class TakenError(LibraryError):
-    """Files or expressions of the user's would be replaced, and nobody has said that they may."""
+    """The user's files or expressions would be replaced without permission."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Item:
     Attributes:
         expression: risorius.expressions.Expression.
         source: RISORIUS, LIBRARY or FILE.
-        path: of the file in the library, where it is there.
-        action: name of the pose asset in this file, where it is there.
+        path: path of its file in the library, or None.
+        action: name of its pose asset in this file, if any.
     """
 
     expression: native.Expression
@@ -64,7 +64,7 @@ def own_folder(part: str) -> Path:
 
 
 def folder(context: Context) -> Path:
-    """The library of the preferences, else the extension's own."""
+    """The folder of the library in the preferences, or the extension's own folder."""
     addon = context.preferences.addons.get(native.ADDON)
     chosen = getattr(addon.preferences, "expression_library", "") if addon is not None else ""
     return Path(bpy.path.abspath(chosen)) if chosen else own_folder("expressions")
@@ -122,7 +122,7 @@ def of_folder(where: Path) -> tuple[list[tuple[Path, native.Expression]], list[s
 
 @session.cached(("unregister",), 4096)
 def _read(path: Path, _changed: int, _size: int) -> tuple[native.Expression, ...] | str:
-    """The expressions of one file, or what is wrong with it; read again when it has changed."""
+    """The expressions of one file, or a sentence about its error; a changed file is read again."""
     try:
         return tuple(native.part("expressions").load(path).values())
     except native.user_errors() as error:
@@ -132,7 +132,7 @@ def _read(path: Path, _changed: int, _size: int) -> tuple[native.Expression, ...
 
 @session.cached(("unregister",), 1024)
 def of_text(text: str) -> native.Expression | None:
-    """The expression of a text that an asset bears, or None where it is none."""
+    """The expression in the text of an asset, or None."""
     part = native.part("expressions")
     try:
         found = part.of_text(text)
@@ -142,7 +142,7 @@ def of_text(text: str) -> native.Expression | None:
 
 
 def of_action(action: bpy.types.Action) -> native.Expression | None:
-    """The expression that a pose asset of this file is of, or None where it is another asset."""
+    """The expression of a pose asset of this file, or None for other assets."""
     text = action.get(MARK) if action.asset_data is not None else None
     return of_text(text) if isinstance(text, str) else None
 
@@ -155,7 +155,7 @@ def find(items: dict[str, Item], name: str) -> Item:
         name: of the expression.
 
     Raises:
-        LibraryError: there is none.
+        LibraryError: no expression has this name.
     """
     if name not in items:
         raise LibraryError(told("There is no expression {name}.", name=name))
@@ -163,16 +163,16 @@ def find(items: dict[str, Item], name: str) -> Item:
 
 
 def name_for(label: str) -> str:
-    """The name of an expression, which is that of its file, from what it is called."""
+    """The name of an expression and its file, from its label."""
     return re.sub(r"\W+", "_", label.strip().lower()).strip("_")
 
 
 def free_label(items: dict[str, Item], label: str) -> str:
-    """A label that no expression has: with a number behind it, where one is needed.
+    """A unique label, with a number if needed.
 
     Args:
         items: of all_items.
-        label: what it should be called.
+        label: wanted label.
     """
     taken, number, tried = {*items, ""}, 1, label
     while name_for(tried) in taken:
@@ -182,12 +182,12 @@ def free_label(items: dict[str, Item], label: str) -> str:
 
 
 class Entry(NamedTuple):
-    """An expression on its way into a library.
+    """An expression to write into a library.
 
     Attributes:
         expression: risorius.expressions.Expression.
-        picture: a PNG file that goes beside it; none leaves what is there.
-        over: the file that it takes the place of; None: a file of its own.
+        picture: a PNG file beside it; empty keeps the existing one.
+        over: the file to replace; None: a new file.
     """
 
     expression: native.Expression
@@ -196,20 +196,21 @@ class Entry(NamedTuple):
 
 
 def write(where: Path, entries: Sequence[Entry]) -> list[Path]:
-    """Put expressions into a library, each file whole at all times.
+    """Write expressions into a library; each file is complete at all times.
 
-    An expression's name only proposes the name of its file, and no file is replaced but those
-    that entries name.
+    An expression's name only proposes the name of its file, and only files named by entries are
+    replaced.
 
     Args:
-        where: the folder; made where it is not there.
-        entries: what goes into it; all of them, or of more than _AT_ONCE those that have room.
+        where: the folder; created if missing.
+        entries: entries to write. Of more than _AT_ONCE entries, those that fit on the disk are
+            written.
 
     Returns:
         The paths of their files.
 
     Raises:
-        ValueError: one cannot be written in this form; then nothing was. OSError.
+        ValueError: an entry cannot be written in this form; nothing was written. OSError.
     """
     part, taken = native.part("expressions"), _stems(where)
     files: list[dict[Path, bytes]] = []
@@ -250,7 +251,7 @@ def _file_name(expression: native.Expression, taken: Sequence[str]) -> str:
 
 
 def _stems(where: Path) -> list[str]:
-    """The files that expressions in a folder have, or would have beside its pictures."""
+    """The names of files of expressions in a folder, including names of pictures."""
     try:
         return sorted(
             p.name if p.suffix == ".toml" else f"{p.stem}.toml"
@@ -262,13 +263,13 @@ def _stems(where: Path) -> list[str]:
 
 
 def check_own(item: Item) -> None:
-    """Whether an expression may be changed.
+    """Check that an expression may be changed.
 
     Args:
         item: of the grid.
 
     Raises:
-        LibraryError: it came with Risorius, or its file holds others too.
+        LibraryError: it belongs to Risorius, or its file has other expressions too.
     """
     if item.source == RISORIUS:
         raise LibraryError(
@@ -284,7 +285,7 @@ def check_own(item: Item) -> None:
 
 
 def remove(item: Item) -> None:
-    """Take an expression of one's own out of the library and out of this file.
+    """Remove the user's own expression from the library and from this file.
 
     Args:
         item: of the grid.
@@ -338,11 +339,11 @@ def favourites() -> set[str]:
 
 
 def set_favourite(names: Iterable[str], on: bool) -> None:
-    """Give expressions a star, or take it away.
+    """Add a star to expressions, or remove it.
 
     Args:
         names: of expressions.
-        on: whether they have one from now on.
+        on: True: add; False: remove.
 
     Raises:
         OSError: the list cannot be written.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face with an expression as a small picture, drawn in NumPy without a window.
 
-A Sitter holds all that is drawn and nothing of Blender's, so pictures are made in a thread, and the
-user's scene is never touched for them.
+A Sitter contains all data for drawing and no Blender data. So a thread draws the pictures, and the
+user's scene does not change.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ _FAR = 15.0  # where one looks from, in distances between the eyes
 
 @dataclass(frozen=True)
 class Piece:
-    """One mesh that is drawn.
+    """One mesh to draw.
 
     Attributes:
         index: of the mesh in the DNA.
         triangles: int64[F, 3] of its vertices.
         uvs: float64[F, 3, 2] of their corners.
-        colors: float64[F, 3] in [0, 1], where there is no image.
+        colors: float64[F, 3] in [0, 1], used without an image.
         image: float32[h, w, 4] in [0, 1], row 0 at v = 0; or None.
-        gloss: how much it mirrors the light.
-        hairs: image's alpha, or that of hairs, is kept: lashes.
+        gloss: strength of the highlight.
+        hairs: True: keep the alpha of the image or of hairs, as for lashes.
         weights: float32[V, J] of the joints.
         shapes: channel, vertex indices and deltas of each target.
     """
@@ -72,10 +72,10 @@ class Sitter:
 
 
 def skin_of(mesh: native.Mesh, joint_count: int) -> NDArray[np.float32]:
-    """The weights of a mesh, float32[V, J]; a vertex without weights has none.
+    """The weights of a mesh, float32[V, J]; rows of vertices without weights are 0.
 
     Args:
-        mesh: of the DNA.
+        mesh: mesh of the DNA file.
         joint_count: of the DNA.
     """
     offsets = np.asarray(mesh.skin_offsets, np.int64)
@@ -104,8 +104,8 @@ def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floa
     """The face with these sliders, seen from the front.
 
     Args:
-        sitter: who.
-        sliders: values by property name; the others are at rest.
+        sitter: the face.
+        sliders: values by property name; other sliders are at rest.
         size: pixels each way.
 
     Returns:
@@ -115,10 +115,10 @@ def draw(sitter: Sitter, sliders: Mapping[str, float], size: int = SIZE) -> Floa
 
 
 def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
-    """Where the vertices of each piece are: float64[V, 3] in file space.
+    """The vertices of each piece: float64[V, 3] in file space.
 
     Args:
-        sitter, sliders: as of draw.
+        sitter, sliders: see draw.
     """
     live = sitter.live
     rests = dict(zip(live.labels, live.rests, strict=True))
@@ -129,11 +129,11 @@ def places(sitter: Sitter, sliders: Mapping[str, float]) -> list[Floats]:
 
 
 def draw_places(sitter: Sitter, placed: Sequence[Floats], size: int = SIZE) -> Floats:
-    """The face with its vertices at these places, as draw.
+    """The face with given vertices, drawn as by `draw`.
 
     Args:
-        sitter, size: as of draw.
-        placed: of `places`.
+        sitter, size: see draw.
+        placed: from `places`.
     """
     view, scale = _frame(sitter)
     high = size * _SMOOTH
@@ -215,7 +215,7 @@ def _frame(sitter: Sitter) -> tuple[Floats, float]:
 
 
 def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats:
-    """Pixels to the right and down, and towards who looks; a little nearer is a little larger."""
+    """Pixels to the right and down, and depth towards the viewer, with a slight perspective."""
     seen = (points - middle)[:, [0, 2, 1]] / half
     seen[:, 2] *= -1.0  # the face looks along -y
     seen[:, :2] *= (_FAR / (_FAR - seen[:, 2]).clip(1.0))[:, None]
@@ -226,7 +226,7 @@ def _on_screen(points: Floats, middle: Floats, half: float, high: int) -> Floats
 
 
 class _Picture:
-    """What the samples of a picture show: colour, normal, depth, gloss."""
+    """The samples of a picture: colour, normal, depth, gloss."""
 
     def __init__(self, high: int) -> None:
         self.high = high
@@ -237,7 +237,7 @@ class _Picture:
         self.shade = native.part("plot.drawing.shade")
 
     def add(self, piece: Piece, screen: Floats) -> None:
-        """Draw a mesh over what is there. Args: screen  float64[V, 3], see _on_screen."""
+        """Draw a mesh over the picture. Args: screen float64[V, 3], see _on_screen."""
         normals = self.shade.vertex_normals(screen * [1.0, -1.0, 1.0], piece.triangles)
         kept = _in_sight(screen[piece.triangles], self.high)
         triangles = piece.triangles[kept]
@@ -273,7 +273,7 @@ class _Picture:
         return picture.reshape(self.high, self.high, 3)[::-1]
 
     def _hollows(self) -> Floats:
-        """[h * w] in [0, 1]: how far a sample lies behind what surrounds it."""
+        """[h * w] in [0, 1]: depth of a sample behind its surroundings."""
         depth = self.depth.reshape(self.high, self.high)
         there = np.isfinite(depth)
         held, reach = np.where(there, depth, 0.0), max(self.high // 24, 1)
@@ -293,9 +293,9 @@ def _paint(piece: Piece, which: Ints, share: Floats) -> tuple[Floats, Floats]:
     """Colour and alpha of samples: float64[n, 3] and [n].
 
     Args:
-        piece: the mesh.
-        which: its triangles, int64[n].
-        share: of their corners, float64[n, 3].
+        piece: mesh of the samples.
+        which: triangle of each sample, int64[n].
+        share: barycentric coordinates, float64[n, 3].
     """
     if piece.image is None:
         solid = 0.0 if piece.hairs else 1.0

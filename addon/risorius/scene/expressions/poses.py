@@ -18,11 +18,11 @@ _MOUTH = {"mouth", "jaw", "tongue"}
 
 
 def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
-    """The sliders of an expression, without those the face lacks.
+    """The sliders of an expression that the face has.
 
     Args:
         live: the character's Runtime.
-        expression: risorius.expressions.Expression, whose weights go by the DNA's control names.
+        expression: risorius.expressions.Expression, with weights by the DNA's control names.
 
     Returns:
         Property name -> value.
@@ -32,7 +32,8 @@ def weights_for(live: runtime.Runtime, expression: native.Expression) -> dict[st
 
 
 def check(live: runtime.Runtime, item: Item) -> None:
-    """Whether a face can show an expression; one of Risorius' own may lack some of its controls.
+    """Check that a face can show an expression. Expressions of Risorius may use controls that the
+    face lacks.
 
     Args:
         live: the character's Runtime.
@@ -60,13 +61,13 @@ def check(live: runtime.Runtime, item: Item) -> None:
 def goals(
     rig: ArmatureObject, item: Item, way: Way, present: Mapping[str, float] | None = None
 ) -> dict[str, float]:
-    """The values that an expression gives the sliders that it concerns.
+    """The target values of an expression for its sliders.
 
     Args:
         rig: the character.
         item: of the grid.
-        way: how it is mixed in.
-        present: values to start from; None for those of now.
+        way: how it is blended.
+        present: values to start from; None: the current values.
 
     Raises:
         LibraryError: it was made for another rig.
@@ -91,14 +92,14 @@ def apply(
     Args:
         rig: the character.
         item: of the grid.
-        way: how it is mixed in.
-        present: values to start from; None for those of now.
+        way: how it is blended.
+        present: values to start from; None: the current values.
 
     Returns:
-        The property names of the sliders that it concerns.
+        The property names of its sliders.
 
     Raises:
-        LibraryError: it was made for another rig; nothing is moved then.
+        LibraryError: it was made for another rig; nothing was moved.
     """
     values = goals(rig, item, way, present)
     sides.put(rig, values)
@@ -113,15 +114,15 @@ def captured(
     values: Mapping[str, float],
     regions: Collection[str] = (),
 ) -> native.Expression:
-    """What a face shows now as an expression.
+    """Make an expression of the current pose.
 
     Args:
         rig: the character.
-        values: what it shows, by the names of its sliders.
+        values: values by slider names.
         name: of the expression.
-        label: what it is called.
+        label: its label.
         group: its category.
-        regions: that it holds; none: all that have a slider off its rest.
+        regions: its regions; none: all regions with a slider that is not at rest.
 
     Raises:
         LibraryError: all sliders of these regions are at rest.
@@ -143,7 +144,7 @@ def captured(
 
 
 def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
-    """The regions that an expression holds; a viseme always the whole mouth.
+    """The regions of an expression; a viseme always has the whole mouth.
 
     Args:
         expression: risorius.expressions.Expression.
@@ -156,7 +157,7 @@ def held_by(expression: native.Expression, weights: Iterable[str]) -> set[str]:
 
 
 def pose_for(live: runtime.Runtime, expression: native.Expression) -> dict[str, float]:
-    """All sliders of the regions that an expression holds, as its pose asset has them.
+    """All sliders of the regions of an expression, as in its pose asset.
 
     Args:
         live: the character's Runtime.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of expressions on the character at hand, kept in files by the hash of what they show.
+"""Pictures of expressions on a character, cached in files by the hash of their content.
 
 The files lie in the extension's own folder, so that every .blend with this character has them.
 """
@@ -39,7 +39,8 @@ class Job(NamedTuple):
 
 
 def look_of(rig: ArmatureObject) -> str:
-    """What tells one character's pictures from another's: its DNA, its images, the way of drawing.
+    """A key for the pictures of a character: its DNA, its images, and the version of the drawing
+    code.
 
     Args:
         rig: the character.
@@ -57,8 +58,8 @@ def path_of(look: str, sliders: Mapping[str, float]) -> Path:
     """The file of a picture.
 
     Args:
-        look: of look_of.
-        sliders: of the expression, by property name.
+        look: from look_of.
+        sliders: sliders of the expression, by property name.
     """
     text = look + repr(sorted((name, round(value, 4)) for name, value in sliders.items()))
     name = hashlib.sha1(text.encode(), usedforsecurity=False).hexdigest()
@@ -66,7 +67,7 @@ def path_of(look: str, sliders: Mapping[str, float]) -> Path:
 
 
 def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
-    """What the pictures of a character are drawn from, or None where it has no mesh.
+    """The data for drawing pictures of a character, or None if it has no mesh.
 
     Args:
         rig: the character.
@@ -87,13 +88,14 @@ def sitter_of(rig: ArmatureObject) -> portrait.Sitter | None:
 
 
 def plain_pieces(live: runtime.Runtime) -> list[portrait.Piece]:
-    """What the pictures of a file are drawn from that is no character of the scene: without
-    materials. Args: live  its Runtime."""
+    """The data for drawing pictures of a file that is not in the scene, without materials. Args:
+    live its Runtime."""
     return [_piece(live, index, (), {}) for index in _meshes(live)]
 
 
 def _meshes(live: runtime.Runtime) -> list[int]:
-    """Of each mesh of the finest level the finest form with few enough faces, else the coarsest."""
+    """For each mesh of the finest level, its finest level with few enough polygons, or the
+    coarsest."""
     dna = live.dna
     rows = dna.lod_mesh_mapping.rows or [range(len(dna.meshes))]
     chosen: dict[str, int] = {}
@@ -144,7 +146,7 @@ def _piece(
 
 
 def _iris(live: runtime.Runtime, places: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Which places on eyeballs are iris: those around the axis of the nearest eye."""
+    """Mask of vertices of eyeballs that belong to the iris, around the axis of the nearest eye."""
     points = live.space.points(places)
     eyes = [live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()]
     if not eyes:
@@ -157,8 +159,8 @@ def _iris(live: runtime.Runtime, places: NDArray[np.float32]) -> NDArray[np.bool
 
 
 def _image_of(material: bpy.types.Material | None) -> bpy.types.Image | None:
-    """The colour's image, which is the active node where there is one: see materials.py; of lashes
-    the one with the hairs."""
+    """The colour image of a material, in its active node (see materials.py); for lashes the image
+    with the hairs."""
     tree = material.node_tree if material is not None else None
     if tree is None:
         return None
@@ -180,7 +182,7 @@ def _color_of(material: bpy.types.Material | None) -> list[float]:
 def _pixels(
     image: bpy.types.Image, known: dict[str, NDArray[np.float32]]
 ) -> NDArray[np.float32] | None:
-    """float32[h, w, 4] of an image made small; its alpha, or its lightness where it has none."""
+    """float32[h, w, 4] of a reduced image; without alpha its lightness is used."""
     if image.name_full not in known:
         copy = image.copy()
         try:
@@ -207,16 +209,16 @@ def make(
     progress: Callable[[float], None] = lambda _share: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Draw pictures and write their files; touches nothing of Blender's.
+    """Draw pictures and write their files, without using Blender data.
 
     Args:
         sitter: the character.
         jobs: the pictures.
-        progress: takes the share that is done, 0 to 1.
-        cancelled: asks whether to end.
+        progress: called with the finished share, 0 to 1.
+        cancelled: returns whether to stop.
 
     Returns:
-        How many were made.
+        The number of pictures.
 
     Raises:
         OSError: a file cannot be written.
@@ -231,7 +233,7 @@ def make(
 
 
 def tidy() -> int:
-    """Remove the oldest pictures where there are too many of them; how many were removed."""
+    """Remove the oldest pictures beyond a limit. Returns: the number of removed pictures."""
     with os.scandir(library.own_folder("thumbnails")) as entries:
         files = [(e.stat().st_mtime, Path(e.path)) for e in entries if e.name.endswith(".png")]
     old = sorted(files)[: max(0, len(files) - _MOST_FILES)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The visemes that a face brings with it, by which it speaks instead of by ours."""
+"""The visemes that come with a face, used for speech instead of those of Risorius."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ class Visemes(NamedTuple):
 
 
 def of(rig: ArmatureObject, shared: Path) -> Visemes:
-    """The visemes beside a face's DNA file, where author put them, and those of a library.
+    """The visemes of a face: beside its DNA file, where `author` writes them, and in a library.
 
-    What moves a control that the face lacks is another face's.
+    A viseme with a control that the face lacks belongs to another face and is left out.
 
     Args:
         rig: the face.
-        shared: folder of the library; what lies beside the file comes before it.
+        shared: folder of the library; visemes beside the file take precedence.
     """
     known, names = set(runtime.there(rig).labels), native.part("expressions").VISEMES
     own: dict[str, native.Expression] = {}
@@ -51,7 +51,7 @@ def of(rig: ArmatureObject, shared: Path) -> Visemes:
 
 
 def beside(rig: ArmatureObject) -> Path | None:
-    """The folder of expressions beside a face's DNA file; None where nobody knows the file.
+    """The folder of expressions beside a face's DNA file; None if the file is unknown.
 
     Args:
         rig: the face.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character's file with what the user edited, and every other byte as it was imported."""
+"""A character's DNA file with the user's edits; all other bytes as imported."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ def export(
         options: ExportOptions; None writes every edit.
 
     Returns:
-        bytes, and sentences on what was changed by how much. Where nothing was edited the bytes
-        are those that were imported.
+        The bytes, and sentences about the changes with their amount. Without edits the imported
+        bytes are returned.
 
     Raises:
-        ExportError: a mesh has other faces than its file, or the character has lost its data.
+        ExportError: a mesh has other polygons than its file, or the character has lost its data.
     """
     options = options or ExportOptions()
     live = runtime.of(rig)
@@ -217,7 +217,7 @@ class _Job:
             target.vertex_indices, target.deltas = indices, deltas
 
     def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-        """Skin weights of the vertices where they were painted; the others bit for bit."""
+        """Write skin weights of painted vertices; other weights keep their bits."""
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
         ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}
@@ -257,7 +257,7 @@ class _Job:
             if edit.moved:
                 change = self._space.file_points(edit.after[None, :3, 3])[0]
                 before = self._space.file_points(edit.before[None, :3, 3])[0]
-                # What did not move along an axis keeps its bits.
+                # Coordinates that did not change keep their bits.
                 far = np.abs(change - before) > 1e-6 * np.abs(before).max(initial=1e-9)
                 offsets[joint][far] = change[far]
             if edit.turned:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known while one file takes the place of another in the same objects."""
+"""The data of replacing one file by another in the same objects."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..character import build, runtime
 
 @dataclass
 class Change:
-    """What replaces what.
+    """The old and the new file of a replacement.
 
     Attributes:
-        rig: the deforming armature that stays.
+        rig: the deforming armature, which stays.
         before, after: Runtimes of the two files.
         old, new: CharacterPlans of the two files.
         old_bones, new_bones: name of the bone of each joint of the old, then of the new file.
@@ -33,13 +33,13 @@ class Change:
     report: list[str] = field(default_factory=list)
 
     def channel_map(self) -> list[int]:
-        """New channel of each old one, -1 where it is gone."""
+        """New channel of each old one, -1 if it no longer exists."""
         return user_edits.index_map(
             *(build.channel_labels(r.dna) for r in (self.before, self.after))
         )
 
     def mesh_map(self) -> list[int]:
-        """New mesh of each old one, -1 where it is gone."""
+        """New mesh of each old one, -1 if it no longer exists."""
         return user_edits.index_map(
             *(names.unique_labels(r.dna.mesh_names) for r in (self.before, self.after))
         )

@@ -38,7 +38,7 @@ class JointEdit:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """What is applied after the file's own local matrix."""
+        """The matrix applied after the file's own local matrix."""
         return np.linalg.inv(self.before) @ self.after
 
     @property
@@ -59,7 +59,8 @@ def _angle(matrix: NDArray[np.float64]) -> float:
 
 
 def bones_by_joint(rig: ArmatureObject) -> dict[int, str]:
-    """Joint -> bone name; of bones that bear the same joint the first is the file's."""
+    """Joint -> bone name; if several bones have the same joint index, the first belongs to the
+    file."""
     found = {}
     for bone in rig.data.bones:
         joint = saved.whole(bone, parts.JOINT, -1, 0)
@@ -79,9 +80,9 @@ def joint_edits(
         plan: CharacterPlan of its file.
 
     Returns:
-        Joint -> JointEdit. Compared with a fresh armature of the same plan, bit for bit; entering
-        edit mode computes roll and tail anew, so a difference counts from what float32 positions
-        of a bone's ends can make of its direction.
+        Joint -> JointEdit. Compared with a new armature of the same plan, bit for bit. Edit mode
+        recomputes roll and tail, so a difference counts only beyond the rounding of a bone's
+        direction from float32 ends.
     """
     wanted = _fresh_rest(context, plan)
     names = bones_by_joint(rig)
@@ -274,7 +275,7 @@ def _depth(bone: bpy.types.EditBone) -> int:
 
 
 def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> None:
-    """The new joint numbers on the bones, also on copies that the user made of them."""
+    """Store the new joint indices on the bones, also on the user's copies of bones."""
     by_name = {name: joint for joint, name in enumerate(names)}
     for bone in rig.data.bones:
         former = saved.whole(bone, parts.JOINT, -1, 0)
@@ -289,7 +290,7 @@ def _number(rig: ArmatureObject, names: Sequence[str], moved: Sequence[int]) -> 
 
 
 def _release(change: Change, moved: Sequence[int]) -> None:
-    """Joints that the new file no longer moves go back to rest: nobody else holds them."""
+    """Set joints to rest that the new file no longer moves."""
     owned = change.after.owned
     for joint in change.before.owned:
         there = moved[joint]
@@ -298,10 +299,10 @@ def _release(change: Change, moved: Sequence[int]) -> None:
 
 
 def rename_groups(change: Change, item: MeshObject) -> None:
-    """Name the vertex groups of a mesh that was built apart as the bones are named here.
+    """Name the vertex groups of a separately built mesh after the bones of this rig.
 
     Args:
-        change: what replaces what, with the names of the bones of the new file's joints.
+        change: the replacement, with the names of the bones of the new file's joints.
         item: the mesh object.
     """
     labels = change.new.armature.labels
@@ -317,7 +318,7 @@ def replace_control_places(context: Context, change: Change) -> None:
 
     Args:
         context: its scene is used to edit bones.
-        change: what replaces what.
+        change: the replacement.
     """
     old = armatures.control_places(change.old)
     new = armatures.control_places(change.new)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes and shape keys of one file become those of another, in the same objects and datablocks."""
+"""Replacing meshes and shape keys of one file by another in the same objects and datablocks."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ _BOUND = {
 
 @dataclass
 class Shape:
-    """Positions of a mesh object as the user left them.
+    """Positions of a mesh object with the user's edits.
 
     Attributes:
         points: float32[V, 3] the basis.
         moved: float64[V, 3] the user's edit of the basis.
-        keys: key name -> float32[V, 3]; without those of ours that are as in the file.
-        relative: key name -> name of the key it is relative to.
-        channels: name of a key of ours -> its old channel.
-        edits: name of an edited key of ours -> float64[V, 3].
+        keys: key name -> float32[V, 3]; without unedited keys of Risorius.
+        relative: key name -> name of its relative key.
+        channels: name of a key of Risorius -> its old channel.
+        edits: name of an edited key of Risorius -> float64[V, 3].
         own: the user's keys.
     """
 
@@ -54,14 +54,14 @@ class Shape:
 
 
 def replace_meshes(change: Change, fresh_meshes: Mapping[int, MeshObject]) -> set[int]:
-    """Move the new file's meshes into the objects that are there.
+    """Move the new file's meshes into the existing objects.
 
     Args:
         change: file_change.Change.
-        fresh_meshes: new mesh number -> the object that was built for it.
+        fresh_meshes: new mesh index -> its new object.
 
     Returns:
-        The new mesh numbers that have found an object.
+        The new mesh indices with an existing object.
     """
     moved = change.mesh_map()
     old_plans = {m.index: m for m in change.old.meshes}
@@ -149,18 +149,18 @@ class _Nothing:
         return np.zeros((self._count, *np.shape(values)[1:]))
 
     def nearest_vertices(self, indices: list[int]) -> list[int]:
-        """The same numbers, as far as there are that many."""
+        """The same indices, without those beyond the number of vertices."""
         return [min(i, self._count - 1) for i in indices]
 
 
 def read_shape(live: runtime.Runtime, item: MeshObject, old: plans.MeshPlan, known: bool) -> Shape:
-    """What the user made of a mesh's positions, told from what the old file gives.
+    """The user's edits of the positions of a mesh, relative to the old file.
 
     Args:
         live: Runtime of the old file.
         item: mesh object.
         old: its MeshPlan in the old file.
-        known: whether it still has as many vertices as in the file.
+        known: whether its number of vertices equals the file.
     """
     points = meshes.basis_of(item)
     shape = Shape(points, np.zeros(points.shape))
@@ -200,7 +200,7 @@ def _own_groups(change: Change, item: MeshObject) -> list[str]:
 def _things(
     change: Change, item: MeshObject, old: plans.MeshPlan | None, shape: Shape, known: bool
 ) -> list[str]:
-    """Words for what the user has put onto a mesh."""
+    """Names of the user's additions to a mesh."""
     layers, lost = transfer.own_attributes(item.data)
     things = {
         "its own faces": not known or (old is not None and not has_faces_of(item.data, old)),
@@ -221,7 +221,7 @@ def _things(
 def _back_up(
     change: Change, item: MeshObject, old: plans.MeshPlan, shape: Shape, known: bool
 ) -> None:
-    """Keep a copy of a mesh that bears something of the user's and gets other faces."""
+    """Keep a copy of a mesh with the user's additions before it gets other polygons."""
     things = _things(change, item, old, shape, known)
     bound = [m.name for m in item.modifiers if m.type in _BOUND]
     if bound:
@@ -247,7 +247,7 @@ def _back_up(
 
 
 def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None:
-    """A mesh that the new file has not: away with it, unless it bears something of the user's."""
+    """Remove a mesh that the new file lacks, unless it has additions of the user."""
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
     things = ["its unknown origin"]
@@ -400,7 +400,7 @@ def _rebuild(
 def _refit_shape(
     change: Change, item: MeshObject, shape: Shape, new: plans.MeshPlan, bearer: transfer.Carry
 ) -> None:
-    """The new neutral with the user's edits, and every key on top of it."""
+    """Set the new neutral mesh with the user's edits, and every key on top of it."""
     channel_map = change.channel_map()
     dna_mesh = change.after.dna.meshes[new.index]
     deltas = meshes.deltas_by_channel(dna_mesh, change.after.space.delta_matrix)
@@ -422,7 +422,7 @@ def _refit_shape(
 
 
 def _added(points: NDArray[np.float32], moves: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Float32 positions with moves on top; those without a move bit for bit as they were."""
+    """float32 positions plus moves; positions without a move keep their bits."""
     result = points.copy()
     rows = np.any(moves != 0, axis=1)
     result[rows] = (points[rows].astype(np.float64) + moves[rows]).astype(np.float32)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Another file takes the place of a character's file, in the same objects.
+"""Replace a character's file by another one in the same objects.
 
 The new character is built beside the old one first, so that a bad file changes nothing. Then its
-numbers move into the objects, meshes, keys and bones that are there: whatever points at them
-stays, and so does everything that is not the file's.
+data move into the existing objects, meshes, keys and bones. References to them stay, and so do all
+additions of the user.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ def replace_file(
     path: str | Path,
     progress: Callable[[float], object] = lambda _share: None,
 ) -> list[str]:
-    """Put a DNA file in the place of a character's file.
+    """Replace a character's file by a DNA file.
 
     Args:
         context: a Blender context with scene and view layer.
         rig: deforming armature of the character.
-        path: of the DNA file; may be the same as before.
+        path: of the DNA file; it may be the same file.
         progress: called with 0..1.
 
     Returns:
-        Sentences on what is new, what is gone, and where the user's things are now.
+        Sentences about new parts, removed parts, and the user's additions.
 
     Raises:
         ReplaceError: the character cannot be changed now.
@@ -166,7 +166,7 @@ def _report_entries(change: Change, entries: drivers.Entries) -> None:
 
 
 def _take_properties(change: Change, fresh: ArmatureObject) -> None:
-    """The file itself, its arrays, and what the armatures say about it."""
+    """Take over the stored file, its arrays, and the properties of the armatures."""
     rig, controls = change.rig, parts.controls_there(change.rig)
     text, former = fresh[parts.DNA], storage.text_of(rig)
     label = former.name if former is not None else text.name
@@ -189,7 +189,7 @@ def _take_properties(change: Change, fresh: ArmatureObject) -> None:
         if saved.whole(rig, key, lods.SAME - 1) not in (*levels, lods.SAME):
             rig.pop(key, None)
             rig[key] = levels[0]
-    # Bones, channels and maps have other numbers now: nothing that was written before counts.
+    # Bones, channels and maps have new indices, so forget the last written values.
     last_written.forget()
     for key in change.old.origin:
         controls.data.pop(names.cut(f"dna_{key}"), None)
@@ -226,7 +226,7 @@ def _adopt(change: Change, fresh: ArmatureObject, item: MeshObject) -> None:
 
 
 def _share_materials(change: Change, item: MeshObject) -> None:
-    """A new level of a part that is there wears that part's material."""
+    """A new level of an existing part gets the material of that part."""
     by_index = {m.index: m for m in change.new.meshes}
     base = by_index[item[parts.MESH]].base
     for other in parts.meshes_of(change.rig):
@@ -248,7 +248,7 @@ def _number_meshes(rig: ArmatureObject) -> None:
 
 
 def _sliders(change: Change) -> None:
-    """Sliders of the new file; those that are gone leave, unless something is keyed on them."""
+    """Add the sliders of the new file; remove obsolete ones unless they have keys."""
     controls = parts.controls_there(change.rig)
     face = controls.pose.bones[parts.FACE]
     maximum = parts.maximum_of(controls)
@@ -285,11 +285,12 @@ def _renew_board(
     led: bool,
     places: Mapping[str, tuple[float, ...]],
 ) -> None:
-    """A face board of the new file's GUI controls; sliders of the same names stay where they are.
+    """Build the face board of the new file's GUI controls; handles of the same names keep their
+    place.
 
     Args:
         context: with a view layer.
-        change: what was replaced by what.
+        change: the replacement.
         led: whether the board led before.
         places: bone -> place of each handle before.
     """

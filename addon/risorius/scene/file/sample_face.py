@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A sample person whose file is not there yet: built beside Blender."""
+"""Building a sample person beside Blender."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class SampleTask(Task[bool]):
     """Builds a person and writes the file with its textures; its result is True.
 
     Attributes:
-        fetched: share of the data that has come, 0 to 1, while they are fetched; else None.
+        fetched: downloaded share of the data, 0 to 1; None while nothing is downloaded.
     """
 
     fetched: float | None = None
@@ -24,8 +24,8 @@ def sample_task(path: Path, person: str, *, offline: bool) -> SampleTask:
     """A task that builds a person.
 
     Args:
-        path: of the DNA file; its folder may hold the wheel of data.
-        person: as the package's PEOPLE name them.
+        path: of the DNA file; its folder may contain the wheel of data.
+        person: a name of the package's PEOPLE.
         offline: do not download.
     """
     sample = native.sample_module()
@@ -59,7 +59,7 @@ def can_be_built(folder: Path) -> bool:
     """Whether a person can be built without a download.
 
     Args:
-        folder: where the wheel of data may lie.
+        folder: folder that may contain the wheel of data.
     """
     return _data(folder) is not None or bool(native.sample_module().is_fetched())
 

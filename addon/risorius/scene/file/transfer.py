@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What users put onto a mesh, carried to another topology by the nearest point of the surface."""
+"""The user's additions to a mesh, transferred to another topology by nearest points of the
+surface."""
 
 from __future__ import annotations
 
@@ -117,8 +118,8 @@ def triangles_of(
 
 
 def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Values]], list[str]]:
-    """The user's layers of a mesh: (name, type, domain, values) of those that can be carried,
-    and the names of the others."""
+    """The user's layers of a mesh: (name, type, domain, values) of transferable layers, and the
+    names of others."""
     kept, other = [], []
     attributes: list[Attribute] = list(mesh.attributes)
     for layer in attributes:
@@ -136,10 +137,10 @@ def own_attributes(mesh: bpy.types.Mesh) -> tuple[list[tuple[str, str, str, Valu
 
 
 class OldSurface:
-    """What is needed of a mesh before its faces are exchanged.
+    """The data of a mesh that are needed after its polygons are replaced.
 
     Args:
-        mesh: a Mesh, still as it was.
+        mesh: the unchanged Mesh.
         points: float32[V, 3] its neutral vertices.
     """
 

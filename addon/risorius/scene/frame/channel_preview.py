@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A channel's test override: one blend shape set by hand, until anything else happens.
+"""A channel's test override: one blend shape set by hand until the next change.
 
-It lives on the deforming armature together with what it was set under: the frame and the
-controls' values. Where either is another one it is over, so that no frame ever depends on a test
-that was forgotten; saving, rendering and loading end it too.
+The deforming armature stores it with the frame and the values of the controls at that time. If
+either differs, the test is over, so that no frame depends on a forgotten test. Saving, rendering
+and loading end it too.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def current(rig: ArmatureObject | None) -> tuple[int, float] | None:
 
 
 def _kept(rig: ArmatureObject) -> tuple[tuple[int, float] | None, str]:
-    """The override of a character that has one, and what it was set under."""
+    """The stored override of a character, and the state in which it was set."""
     kept = saved.table(rig, parts.TEST) or {}
     channel = saved.whole(kept, "channel", -1, 0)
     test = (channel, saved.number(kept, "value", 0.0, -_MOST, _MOST)) if channel >= 0 else None
@@ -66,7 +66,7 @@ def _kept(rig: ArmatureObject) -> tuple[tuple[int, float] | None, str]:
 def override(
     rig: ArmatureObject, raw: NDArray[np.float32], scene: bpy.types.Scene
 ) -> tuple[int, float] | None:
-    """The override that holds for this evaluation; ends one whose time is over.
+    """The override for this evaluation; an outdated override is removed.
 
     Args:
         rig: deforming armature.

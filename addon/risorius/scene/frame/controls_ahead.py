@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The controls of a frame before Blender evaluates it.
 
-Blender evaluates a frame in one go, simulations too, and calls its handlers afterwards: what they
-write comes too late for cloth and hair. So the control armatures alone are evaluated first, in a
-graph of their own, and the face has its pose when the frame begins.
+Blender evaluates a frame in one go, simulations too, and calls its handlers afterwards: values
+    written by handlers come too late for cloth and hair. So Risorius evaluates the control
+    armatures first in a separate graph, and the face has its pose when the frame begins.
 
 The scene of that graph is in no file, see `stage`.
 """
@@ -27,7 +27,7 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 
 # Scene -> its stage.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# Whether the file was edited since the last frame, and whether anything in it is simulated.
+# Whether the file was edited since the last frame, and whether it has a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes, since the last load or undo.
@@ -44,10 +44,10 @@ def is_edited() -> bool:
 
 
 def is_needed() -> bool:
-    """Whether anything sees a frame before its faces could be brought up after it.
+    """Whether anything reads the faces before handlers run after the frame.
 
-    Else the curves would be evaluated twice for nothing. The first frame after an edit is always
-    done: what was edited may read a face.
+    Otherwise the curves would be evaluated twice for nothing. The first frame after an edit always
+    counts, because edited objects may read a face.
     """
     if is_edited():
         _simulated.now = caches.any_simulates()
@@ -66,12 +66,12 @@ def note_evaluated(scene: bpy.types.Scene) -> None:
 def is_safe(user: bpy.types.Scene) -> bool:
     """Whether a graph may be built before a frame of a scene.
 
-    Blender builds the scene's own graph anew then. Blender 4.2 and 4.3 die of that where this graph
-    was built and never evaluated, as that of a scene which a window was just switched to: its
-    first frame is brought up afterwards. To look into such a graph is as deadly.
+    Blender then rebuilds the graph of the scene. Blender 4.2 and 4.3 crash if this graph was built
+    and never evaluated, such as after switching a window to the scene. Then the first frame is
+    updated afterwards. Reading such a graph crashes too.
 
     Args:
-        user: the scene that Blender is about to evaluate.
+        user: the scene to be evaluated.
     """
     return bpy.app.version >= (4, 4) or user.session_uid in _evaluated_scenes
 
@@ -80,12 +80,12 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
     """Evaluate the controls of faces at the time of a scene.
 
     Args:
-        user: the scene that Blender is about to evaluate.
-        faces: those in it.
+        user: the scene to be evaluated.
+        faces: faces of the scene.
 
     Returns:
-        The graph, and the faces whose controls can be read in it: not those that depend on what
-        a face does, which is not known yet. Where another thread is at it, none.
+        The graph, and the faces whose controls can be read in it: without faces whose controls
+            depend on a face, which is not evaluated yet. Empty if another thread uses the graph.
     """
     if not _LOCK.acquire(blocking=False):
         return None, []
@@ -95,8 +95,8 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
         if graph is None or not _faces_in(graph, known, whole=_edited.now):
             _edited.now = False
             return graph, known
-        # Either Blender built the graph anew since, and the whole faces came in with the
-        # pointers; or something there depends on a face.
+        # Either Blender rebuilt the graph and added the whole faces, or an object of the graph
+        # depends on a face.
         _close()
         graph = _evaluated(user, known)
         if _faces_in(graph, known, whole=True):
@@ -113,14 +113,14 @@ def at(user: bpy.types.Scene, faces: Sequence[Face]) -> tuple[Depsgraph | None, 
 
 
 def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject) -> str:
-    """Look anew whether what moves a face depends on it.
+    """Check again whether the inputs of a face depend on the face.
 
     Args:
-        user: a scene that has it.
+        user: a scene with the face.
         rig, controls: its armatures.
 
     Returns:
-        Why it cannot be baked, in one sentence; empty where it can.
+        The reason why it cannot be baked, in one sentence; empty if it can.
     """
     lateness.forget(rig)
     with _LOCK:
@@ -135,13 +135,13 @@ def examine(user: bpy.types.Scene, rig: ArmatureObject, controls: ArmatureObject
 
 
 def note_edit() -> None:
-    """Something was edited: Blender may build graphs anew."""
+    """Note an edit, after which Blender may rebuild graphs."""
     _edited.now = True
 
 
 @session.at("free")
 def close() -> None:
-    """Give the scene and its graph back: before undo and load, which free what they point to."""
+    """Release the scene and its graph before undo and load, which free their data."""
     with _LOCK:
         _close()
 
@@ -165,7 +165,7 @@ def _evaluated(user: bpy.types.Scene, faces: Sequence[Face]) -> Depsgraph:
 
 
 def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
-    """Whether what moves a face depends on one of several faces, itself among them."""
+    """Whether the inputs of a face depend on one of several faces or on itself."""
     made = stage.Stage(_roots([face]))
     try:
         with stage.alone(c for _rig, c in others):
@@ -175,7 +175,7 @@ def _depends(user: bpy.types.Scene, face: Face, others: Sequence[Face]) -> bool:
 
 
 def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
-    """The control armatures, and the bodies: of a body's bones only those are read that turn."""
+    """The control armatures, and the bodies: only rotating bones of a body are read."""
     found: dict[bpy.types.Object, None] = {}
     for _rig, controls in faces:
         hold = rig_placement.body_of(controls)

@@ -27,22 +27,22 @@ from ..skinning import bone_writer, conditions, direct, live_keys
 from . import channel_preview, controls_ahead, inputs, joint_readings, lateness, look_masks, timing
 
 _pauses = session.value("evaluate.pauses", 0, ("unregister",))
-# Deforming armature -> what was done before this frame.
+# Deforming armature -> work done before this frame.
 _ahead: dict[int, _Ahead] = session.table("evaluate.ahead", ("frame",))
 # Finished positions of several faces that are written together; None: at once.
 _gathered = session.value(
     "evaluate.gathered", cast("list[direct.Job] | None", None), ("unregister",)
 )
-# Deforming armature -> what the controls of a face asked for when its file was opened.
+# Deforming armature -> inputs of its face when the file was opened.
 _opened: dict[int, tuple[object, ...]] = session.table("evaluate.opened", ("load",))
 
 
 class Moment(Enum):
-    """When a character is brought up.
+    """The moment of an update of a character.
 
-    UPDATE: after Blender evaluated what is read. ANEW: then, too, and what seems unchanged is
-    written as well. FRAME: before Blender evaluates a frame. RENDER: before one that is rendered.
-    LOAD: after a file was opened, whose faces stay as they were saved until they move.
+    UPDATE: after Blender evaluated the inputs. ANEW: the same, and unchanged values are written
+        too. FRAME: before Blender evaluates a frame. RENDER: before a rendered frame. LOAD: after
+        opening a file, whose faces keep their saved state until they move.
     """
 
     UPDATE = auto()
@@ -57,11 +57,11 @@ _BEFORE_FRAME = frozenset((Moment.FRAME, Moment.RENDER))
 
 @dataclass(frozen=True)
 class _Ahead:
-    """What was done for a character before its frame.
+    """The work done for a character before its frame.
 
     Attributes:
-        glance: see _glance; None where it does not tell all.
-        wrote: whether there was anything to write.
+        glance: see _glance; None if it is incomplete.
+        wrote: whether anything was written.
         rendering: whether the frame is rendered.
     """
 
@@ -72,7 +72,7 @@ class _Ahead:
 
 @contextmanager
 def paused() -> Iterator[None]:
-    """While this lasts no frame and no update brings a face up: what is read is read by others."""
+    """Context manager: no frame and no update evaluates faces meanwhile."""
     _pauses.now += 1
     try:
         yield
@@ -129,7 +129,8 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
 
 
 def _look_at_joints(edited: bool) -> bool:
-    """Look once a frame what turns the joints of all faces; whether any is read from its bone."""
+    """Read the rotations of joints of all faces once a frame. Returns: whether any comes from its
+    bone."""
     found = False
     for rig in parts.rigs():
         live = runtime.of(rig) if parts.BAKED not in rig else None
@@ -142,10 +143,10 @@ def _look_at_joints(edited: bool) -> bool:
 
 
 def after_frame(depsgraph: Depsgraph) -> None:
-    """Bring up what could not be brought up before its frame, and count it.
+    """Evaluate the faces that could not be evaluated before the frame, and count them.
 
     Args:
-        depsgraph: what Blender has evaluated.
+        depsgraph: the evaluated graph.
     """
     if native.problem() or is_paused():
         return
@@ -166,7 +167,7 @@ def after_frame(depsgraph: Depsgraph) -> None:
 
 
 def _glance(seen: ArmatureObject) -> tuple[object, ...]:
-    """What moves a simple character, to compare and not to read. Args: seen  its controls."""
+    """The inputs of a simple character, for comparison only. Args: seen its controls."""
     bones = seen.pose.bones
     matrices = np.empty(16 * len(bones), np.float32)
     bones.foreach_get("matrix", matrices)
@@ -184,7 +185,7 @@ def _is_simple(rig: ArmatureObject, seen: ArmatureObject) -> bool:
 
 
 def _is_as_before(rig: ArmatureObject, done: _Ahead, depsgraph: Depsgraph) -> bool:
-    """Whether a character's controls are, after its frame, what they were before it."""
+    """Whether a character's controls are the same before and after the frame."""
     controls = parts.controls_of(rig)
     if done.glance is None or controls is None:
         return False
@@ -275,7 +276,7 @@ def _write_meshes(
 
 
 def _write_finished(job: direct.Job) -> None:
-    """Write finished positions now, or with those of the other faces: all cores do it together."""
+    """Write final positions now, or together with other faces on all cores."""
     if _gathered.now is None:
         direct.write([job])
     else:
@@ -307,7 +308,7 @@ def _plan(
     moment: Moment,
     rendering: bool,
 ) -> conditions.Plan:
-    """How a face is shown now. Args: see evaluate; asked  what its controls ask for."""
+    """The Plan of showing a face now. Args: see evaluate; asked its inputs."""
     if rendering:  # modes do not change in a render: Blender would build its graph anew
         return conditions.known(rig) or conditions.ORDINARY
     if moment is Moment.LOAD:
@@ -338,7 +339,7 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
     context.view_layer.update()
     evaluate(rig, context.evaluated_depsgraph_get(), Moment.ANEW)
     context.view_layer.update()
-    # Nothing is left to be evaluated after an operator, so 5.2 would draw no view again.
+    # After an operator Blender 5.2 has nothing to evaluate and would not redraw views.
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -346,5 +347,5 @@ def bring_up(context: Context, rig: ArmatureObject) -> None:
 
 
 def refused(rig: ArmatureObject) -> list[bpy.types.Object]:
-    """Objects of a character, an override, that Blender lets nobody write to."""
+    """Objects of an override character that Blender does not allow to be written."""
     return [item for item in (rig, *parts.meshes_of(rig)) if last_written.is_refused(item)]

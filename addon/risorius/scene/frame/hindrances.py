@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What keeps a face from doing what its controls say, in words for the panel."""
+"""Reasons why a face does not follow its controls, as sentences for the panel."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ _LEANS = 1e-4  # cosine of the angle between two axes of a place from which it c
 
 
 def words(rig: ArmatureObject) -> Iterator[str]:
-    """Sentences on what leads in place of the controls. Args: rig  deforming armature."""
+    """Sentences about animation that leads instead of the controls. Args: rig deforming
+    armature."""
     controls = parts.controls_of(rig)
     if controls is None or parts.BAKED in rig:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the animator asks for: sliders, head, neck and eye bones of the control armature."""
+"""The inputs of a face: sliders and the bones of head, neck and eyes of the control armature."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def read_inputs(
     Args:
         seen: the evaluated control armature object.
         live: the character's Runtime.
-        depsgraph: where the body's bones are read, if the face hangs on one.
-        maximum: what the look controls are clamped to after the eye bones are added.
+        depsgraph: graph for reading a body's bones, if the face hangs on one.
+        maximum: upper limit of the look controls after adding the eye bones.
 
     Returns:
-        float32[R] raw controls, and joint turns: "neck" and "head" -> Quaternion in the
-        armature's axes, without those that are straight.
+        float32[R] raw controls, and joint turns: "neck" and "head" -> Quaternion in the armature's
+        axes, without rest rotations.
     """
     raw, own = read_mixed(seen, live, depsgraph, maximum)
     return complete(seen, live, depsgraph, maximum, raw, own)
@@ -53,11 +53,11 @@ def read_mixed(
     """Read the sliders and the control bones with the layers above them.
 
     Args:
-        seen, live, depsgraph, maximum: as of `read_inputs`.
+        seen, live, depsgraph, maximum: see `read_inputs`.
 
     Returns:
-        float32[R], before the eye bones add to the look controls; and what the bones ask for,
-        without the body's turns.
+        float32[R], before the eye bones add to the look controls; and the rotations of the bones,
+        without the body's.
     """
     bones = seen.pose.bones
     raw = read_leading(seen, live)
@@ -71,7 +71,7 @@ def read_mixed(
 
 
 def seen_sliders(context: Context, rig: ArmatureObject) -> dict[str, float]:
-    """What a face is seen with, by the names of its sliders: board and layers included.
+    """The visible values of a face by slider names, including board and layers.
 
     Args:
         context: has the evaluated scene.
@@ -97,19 +97,19 @@ def complete(
     raw: NDArray[np.float32],
     own: layer_mixing.Bones,
 ) -> tuple[NDArray[np.float32], Turns]:
-    """Add what the body and the eye bones ask for.
+    """Add the rotations of the body and the effect of the eye bones.
 
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.
         depsgraph: the evaluated graph that has the body too.
         maximum: of the sliders.
-        raw: float32[R], the sliders with their layers; the look controls, and the controls that
-            hold rotations of joints, are changed in place.
-        own: what the character's own control bones ask for, with their layers.
+        raw: float32[R], the sliders with their layers; the look controls and the controls of joint
+            rotations are changed in place.
+        own: rotations of the character's own control bones, with layers.
 
     Returns:
-        raw, and the turns with the body's, as `read_inputs` gives them.
+        raw, and the rotations with the body's, as from `read_inputs`.
     """
     turns = rig_placement.body_turns(seen.original, depsgraph)
     share = seen.risorius_body_turn
@@ -125,7 +125,7 @@ def complete(
 
 
 def read_leading(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
-    """Read what leads the face: the sliders, or the face board.
+    """Read the leading values of the face, from sliders or face board.
 
     Args:
         seen: the evaluated control armature.
@@ -141,7 +141,8 @@ def read_leading(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.floa
 
 
 def read_sliders(seen: ArmatureObject, live: runtime.Runtime) -> NDArray[np.float32]:
-    """Read the sliders alone; what is no number counts as 0, what is missing as its rest.
+    """Read the sliders alone. A value that is not finite counts as 0, a missing slider as its rest
+    value.
 
     Args:
         seen: the evaluated control armature.
@@ -167,7 +168,7 @@ def _rests(bone: bpy.types.PoseBone) -> bool:
 
 
 def _turn(seen: ArmatureObject, bone: bpy.types.PoseBone | None) -> Quaternion | None:
-    """A bone's own rotation in the armature's axes, or None where it is straight."""
+    """A bone's own rotation in the armature's axes, or None at rest."""
     if bone is None or _rests(bone):
         return None
     turn = rig_placement.own_turn(seen, bone)
@@ -182,7 +183,7 @@ def _add_look(
     turns: Turns,
     own: layer_mixing.Bones,
 ) -> None:
-    """Add what the eye bones and their target ask for to the look controls; the lids follow."""
+    """Add the rotations from eye bones and target to the look controls; the lids follow."""
     bones = seen.pose.bones
     eyes = {side: bones[f"eye_{side}"] for side in live.look if f"eye_{side}" in bones}
     target = gaze.target_of(seen, live, turns, own.target)

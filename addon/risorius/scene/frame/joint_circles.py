@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Joints that follow what their own neck poses move.
+"""Joints that follow bones moved by their own neck poses.
 
-A constraint on the bone of a joint may follow, over any number of objects, a bone or a mesh that
-the poses move which the joint's rotation fires. Such a face has no pose that fits itself.
+A constraint on the bone of a joint may depend, through any number of objects, on a bone or mesh
+that moves with the poses fired by the joint. Such a face has no consistent pose.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ def words(cause: str) -> str:
 
 
 def cause(rig: ArmatureObject, live: runtime.Runtime, joint: int, bone: bpy.types.PoseBone) -> str:
-    """What makes a joint follow its own neck poses, in words; empty where nothing does.
+    """The reason why a joint follows its own neck poses, as text; empty if it does not.
 
     Args:
         rig: deforming armature.
         live: the character's Runtime.
-        joint: whose rotation raw controls hold.
+        joint: joint whose rotation is stored in raw controls.
         bone: its bone.
     """
     moved = _moved_by_poses(live)
@@ -73,13 +73,13 @@ def _moved_by_poses(live: runtime.Runtime) -> set[int]:
 def _leads_to(
     rig: ArmatureObject, moved: set[str], followed: Followed, seen: set[Followed]
 ) -> bool:
-    """Whether something is, or follows, what the neck poses move.
+    """Whether an object or bone is moved by the neck poses or follows them.
 
     Args:
         rig: deforming armature of the face.
-        moved: names of its bones that the poses move; what hangs on these moves too.
-        followed: what is looked at.
-        seen: what was looked at before.
+        moved: names of bones that the poses move; their children move too.
+        followed: the object or bone to check.
+        seen: objects and bones already checked.
     """
     owner, name = followed
     if owner == rig and (name in _ARRAYS or _hangs_on(rig, name, moved)):
@@ -106,7 +106,7 @@ def _keys_of(rig: ArmatureObject) -> list[bpy.types.Key]:
 
 
 def _followed_by(owner: bpy.types.Object, bone: str) -> Iterator[Followed]:
-    """What an object, or a bone of it, follows straight away."""
+    """Objects and bones that an object, or one of its bones, follows directly."""
     if owner.parent is not None:
         yield owner.parent, owner.parent_bone if owner.parent_type == "BONE" else ""
     for hold in owner.constraints:

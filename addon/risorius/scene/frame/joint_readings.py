@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which joints of neck and head something else than the control bones turns.
+"""The joints of neck and head that are turned by anything but the control bones.
 
-Their rotations are read from the evaluated bones. Asked once a frame and after edits.
+Their rotations are read from the evaluated bones. This is checked once a frame and after edits.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from . import joint_circles
 
 @dataclass
 class Reading:
-    """What turns the joints of one face, until its file is edited.
+    """The sources of joint rotations of one face, valid until the file is edited.
 
     Attributes:
-        held: positions of the bones of the joints whose rotation raw controls hold.
-        wiring: what is compared to see whether it still holds.
-        keyed: positions of the bones of neck and head that keys or drivers of the deforming
-            armature turn: these lead, the evaluator does not write them.
-        places: joint -> position of its bone, of the joints whose rotation is read from the bone.
-        circle: why joints with constraints are not read, in words; empty where all are.
-        is_fresh: whether nothing was edited since.
+        held: positions of bones whose joint rotation is stored in raw controls.
+        wiring: state that is compared to notice changes.
+        keyed: positions of bones of neck and head with keys or drivers on the deforming armature.
+            These lead, and the evaluator does not write them.
+        places: joint -> position of its bone, for rotations read from the bone.
+        circle: the reason why joints with constraints are not read; empty if all are.
+        is_fresh: whether the file is unedited since.
     """
 
     held: tuple[int, ...]
@@ -40,7 +40,7 @@ class Reading:
 
 
 def of(rig: ArmatureObject, live: runtime.Runtime) -> Reading:
-    """What turns the joints of a face, as last looked at.
+    """The last Reading of a face.
 
     Args:
         rig: deforming armature.
@@ -53,13 +53,13 @@ def of(rig: ArmatureObject, live: runtime.Runtime) -> Reading:
 
 
 def look(rig: ArmatureObject, live: runtime.Runtime, edited: bool) -> Reading:
-    """Look anew what turns the joints of a face; a circle that is new is told to the console.
+    """Update the Reading of a face; a new circle is printed to the console.
 
     Args:
         rig: deforming armature.
         live: the character's Runtime.
-        edited: whether the file was edited since the last look: else only what stands on the face
-            itself is compared.
+        edited: True: the file was edited since the last Reading. False: only settings of the face
+            itself are compared.
     """
     kept = last_written.readings.get(rig.session_uid)
     before = kept if isinstance(kept, Reading) else None
@@ -94,14 +94,14 @@ def reads(rig: ArmatureObject) -> bool:
 
 
 def note_edit() -> None:
-    """Something was edited: what turns the joints of faces is looked at anew when it is needed."""
+    """Note an edit, so that Readings of faces are updated when needed."""
     for kept in last_written.readings.values():
         if isinstance(kept, Reading):
             kept.is_fresh = False
 
 
 def words(rig: ArmatureObject) -> str:
-    """What the panel says of joints that follow what follows them; else empty.
+    """The sentence of the panel about circular joints; else empty.
 
     Args:
         rig: deforming armature.
@@ -128,7 +128,7 @@ def _wiring(rig: ArmatureObject, held: tuple[int, ...]) -> tuple[object, ...]:
 
 
 def _keyed(rig: ArmatureObject, writer: bone_writer.Writer) -> frozenset[int]:
-    """Positions of bones of neck and head whose rotation an action, a strip or a driver moves."""
+    """Positions of bones of neck and head with a rotation from an action, a strip or a driver."""
     if not drivers.moves(rig):
         return frozenset()
     places = {int(writer.where[row]) for _name, row, _share, _rest in writer.turning}

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The raw controls that hold rotations of joints: filled before the face is evaluated.
+"""Filling the raw controls of joint rotations before the face is evaluated.
 
-RBF poses of the file read them and repair neck and jaw when the head turns. The control bones,
-layers, live capture and a body turn head and neck, which is known before the frame. Where something
-else turns a joint, such as a constraint on its bone, Blender has to evaluate the bone first: see
-joint_readings.
+RBF poses of the file read them and repair neck and jaw when the head turns. Rotations by control
+bones, layers, live capture and a body are known before the frame. If anything else turns a joint,
+such as a constraint on its bone, Blender must evaluate the bone first: see joint_readings.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ _NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
 
 
 def has_any(rig: ArmatureObject) -> bool:
-    """Whether raw controls of a character hold rotations of joints. Args: rig  its armature."""
+    """Whether a character has raw controls of joint rotations. Args: rig its armature."""
     live = runtime.of(rig)
     return live is not None and bool(live.turning)
 
@@ -52,14 +51,14 @@ def fill(
     raw: NDArray[np.float32],
     turns: Mapping[str, Quaternion],
 ) -> None:
-    """Set the raw controls that hold rotations of joints, in place.
+    """Set the raw controls of joint rotations in place.
 
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.
-        depsgraph: where the bones of the deforming armature are read, if they are.
+        depsgraph: graph for reading bones of the deforming armature, if needed.
         raw: float32[R], the raw controls.
-        turns: "neck" and "head" -> Quaternion in the armature's axes, without straight ones.
+        turns: "neck" and "head" -> Quaternion in the armature's axes, without rest rotations.
     """
     if not live.turning or not seen.risorius_neck_poses:
         return
@@ -99,6 +98,6 @@ def _bones(
 
 
 def _one_sign(turn: tuple[float, float, float, float]) -> tuple[float, ...]:
-    """Of q and -q the one whose last part other than 0 is positive."""
+    """The one of q and -q whose last component other than 0 is positive."""
     last = next((part for part in reversed(turn) if abs(part) > _NOTHING), 1.0)
     return tuple(-part for part in turn) if last < 0.0 else turn

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Faces that are brought up after their frame, and why: simulations see those one frame late.
+"""Faces that are evaluated after their frame, and the reasons: simulations see them one frame late.
 
-Kept by session uids and never saved.
+The data are kept by session uids and never saved.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..base.blender_types import ArmatureObject
 
 @dataclass
 class _Late:
-    """Attributes: cause  what it follows, in words; wiring  see _wiring; frames  that were late."""
+    """Attributes: cause the reason as text; wiring see _wiring; frames late frames."""
 
     cause: str
     wiring: tuple[object, ...] = ()
@@ -29,12 +29,13 @@ class _Late:
 
 # Deforming armature -> why its controls wait for a face.
 _circles: dict[int, _Late] = session.table("lateness.circles", ("undo", "load"))
-# Deforming armature -> what had another value after the frame than before it.
+# Deforming armature -> control whose value changed during the frame.
 _others: dict[int, _Late] = session.table("lateness.others", ("undo", "load"))
 
 
 def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
-    """Whether a face is known to read itself or another face; forgotten where it is wired anew.
+    """Whether a face is known to depend on itself or another face; forgotten when its dependencies
+    change.
 
     Args:
         rig, controls: its armatures.
@@ -49,7 +50,7 @@ def is_circle(rig: ArmatureObject, controls: ArmatureObject) -> bool:
 
 
 def note_circle(rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """Note that what moves a face depends on one. Args: rig, controls  its armatures."""
+    """Note that the inputs of a face depend on a face. Args: rig, controls its armatures."""
     cause = next(_causes(controls), told("Something that the controls follow"))
     _circles[rig.session_uid] = _Late(cause, _wiring(controls))
 
@@ -73,7 +74,7 @@ def count(rig: ArmatureObject, before: object, after: object, labels: Sequence[s
 
 
 def _difference(before: object, after: object, labels: Sequence[str]) -> str:
-    """Which control had two values; empty where it was the level of detail."""
+    """The control with two values; empty if the level of detail differed."""
     if not isinstance(before, tuple) or not isinstance(after, tuple):
         return ""
     states = cast("tuple[object, ...]", before), cast("tuple[object, ...]", after)
@@ -87,13 +88,13 @@ def _difference(before: object, after: object, labels: Sequence[str]) -> str:
 
 
 def circle(rig: ArmatureObject) -> str:
-    """What of a face depends on what a face does, in words; empty where nothing does."""
+    """The control of a face that depends on a face, as text; empty if none does."""
     kept = _circles.get(rig.session_uid)
     return kept.cause if kept is not None else ""
 
 
 def words(rig: ArmatureObject) -> str:
-    """What the panel says of a face that is late; empty for others."""
+    """The sentence of the panel about a late face; empty for others."""
     kept = _circles.get(rig.session_uid)
     if kept is not None:
         return told(
@@ -119,7 +120,7 @@ def total() -> int:
 
 
 def forget(rig: ArmatureObject | None = None) -> None:
-    """Forget what is known of a face, or of all. Args: rig  its deforming armature."""
+    """Forget the data of a face, or of all. Args: rig its deforming armature."""
     for kept in (_circles, _others):
         if rig is None:
             kept.clear()
@@ -128,7 +129,7 @@ def forget(rig: ArmatureObject | None = None) -> None:
 
 
 def _wiring(controls: ArmatureObject) -> tuple[object, ...]:
-    """What the controls follow, as far as it stands on them: compared, not read."""
+    """The direct dependencies of the controls, for comparison only."""
     data = controls.animation_data
     return (
         controls.parent.session_uid if controls.parent is not None else 0,
@@ -146,7 +147,7 @@ def _constraints(controls: ArmatureObject) -> Iterator[tuple[str, bpy.types.Cons
 
 
 def _causes(controls: ArmatureObject) -> Iterator[str]:
-    """Names of what reads a part of a face straight away; what goes by others has none."""
+    """Names of controls that depend directly on a part of a face."""
     members = set()
     for rig in parts.rigs():
         items = parts.meshes_of(rig)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is left out of a face's look: all controls but some (solo), its joints, shapes or maps.
+"""Solo and mute: controls, joints, shapes or maps that are left out of the view of a face.
 
-The controls themselves stay as they are, so that nothing is keyed, baked or exported otherwise. It
-lives on the deforming armature, where undo finds it, but in no file: saving takes it away and gives
-it back. Renders show the whole face unless the user asks.
+The controls keep their values, so keys, bakes and exports do not change. The deforming armature
+stores the setting, so that undo restores it. Files never contain it: saving removes and restores
+it. Renders show the whole face unless the user asks for less.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from ..base.blender_types import ArmatureObject
 from ..character import runtime
 
 KINDS = ("JOINTS", "SHAPES", "MAPS")
-# Deforming armature -> what was taken from it while a file is saved.
+# Deforming armature -> setting removed while a file is saved.
 _held: dict[int, str] = session.table("look_masks.held", ("unregister",))
 
 
 @dataclass(frozen=True)
 class Look:
-    """What of a face is shown.
+    """The shown parts of a face.
 
     Attributes:
-        solo: labels of the controls that alone are shown; none: all are.
-        muted: those of KINDS that rest.
-        in_renders: whether that holds for renders too.
+        solo: labels of controls shown alone; none: all.
+        muted: muted KINDS.
+        in_renders: whether renders use it too.
     """
 
     solo: frozenset[str] = frozenset()
@@ -40,7 +40,7 @@ class Look:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is left out."""
+        """Whether the whole face is shown."""
         return not self.solo and not self.muted
 
 
@@ -48,7 +48,7 @@ WHOLE = Look()
 
 
 def of(rig: ArmatureObject) -> Look:
-    """What of a character is shown. Args: rig  its deforming armature."""
+    """The Look of a character. Args: rig its deforming armature."""
     kept = rig.get(parts.LOOK)
     if not isinstance(kept, str):
         return WHOLE
@@ -57,11 +57,11 @@ def of(rig: ArmatureObject) -> Look:
 
 
 def put(rig: ArmatureObject, look: Look) -> None:
-    """Choose what of a character is shown; the caller evaluates afterwards.
+    """Set the Look of a character; the caller evaluates afterwards.
 
     Args:
         rig: its deforming armature.
-        look: what shall be shown of it.
+        look: the new Look.
     """
     if look.is_whole:
         rig.pop(parts.LOOK, None)
@@ -71,29 +71,29 @@ def put(rig: ArmatureObject, look: Look) -> None:
 
 
 def solo(rig: ArmatureObject, names: Collection[str]) -> None:
-    """Show these controls alone; what is muted stays so.
+    """Show these controls alone; muted parts stay muted.
 
     Args:
         rig: deforming armature.
-        names: labels of controls; none: all are shown again.
+        names: labels of controls; none: show all again.
     """
     put(rig, replace(of(rig), solo=frozenset(names)))
 
 
 def mute(rig: ArmatureObject, kind: str, on: bool) -> None:
-    """Let joints, shapes or maps rest, or move again.
+    """Mute or unmute joints, shapes or maps.
 
     Args:
         rig: deforming armature.
         kind: of KINDS.
-        on: whether they rest.
+        on: True: mute.
     """
     look = of(rig)
     put(rig, replace(look, muted=look.muted | {kind} if on else look.muted - {kind}))
 
 
 def for_frame(rig: ArmatureObject, is_render: bool) -> Look:
-    """What holds for this evaluation.
+    """The Look for this evaluation.
 
     Args:
         rig: deforming armature.
@@ -107,12 +107,12 @@ def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArr
     """The raw controls that are evaluated.
 
     Args:
-        look: what is shown.
-        raw: float32[R], what the controls ask for.
+        look: the Look.
+        raw: float32[R], raw controls.
         live: the Runtime of the character.
 
     Returns:
-        float32[R]: those that are not shown rest.
+        float32[R]: hidden controls are at rest.
     """
     if not look.solo:
         return raw
@@ -121,10 +121,10 @@ def raw_of(look: Look, raw: NDArray[np.float32], live: runtime.Runtime) -> NDArr
 
 
 def apply(look: Look, pose: native.Pose, live: runtime.Runtime, lod: int) -> None:
-    """Let what is muted rest, in place.
+    """Set muted parts to rest, in place.
 
     Args:
-        look: what is shown.
+        look: the Look.
         pose: of the character's rig, changed.
         live: its Runtime.
         lod: the level of the pose.
@@ -152,7 +152,7 @@ def take_away() -> bool:
 
 
 def give_back() -> bool:
-    """After `take_away`: each has again what it had. Returns whether one had something."""
+    """Restore the settings that `take_away` removed. Returns: whether there were any."""
     given = bool(_held)
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
@@ -164,7 +164,7 @@ def give_back() -> bool:
 
 
 def bring_up_later(rig: ArmatureObject) -> None:
-    """Let the next update evaluate a character anew."""
+    """Make the next update evaluate a character."""
     last_written.forget()
     controls = parts.controls_of(rig)
     if controls is not None:

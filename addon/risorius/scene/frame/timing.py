@@ -17,7 +17,7 @@ _KEPT = 30  # frames that the overlay shows the median of
 
 
 class Frame:
-    """Milliseconds of one frame: of our stages, and of what Blender does around them."""
+    """Milliseconds of one frame: stages of Risorius, and Blender's own part."""
 
     def __init__(self) -> None:
         self.begin = self.ended = perf_counter()
@@ -46,7 +46,7 @@ def animated() -> None:
 
 
 def evaluated() -> None:
-    """Blender has evaluated the frame; what was brought up before it is in it."""
+    """Note that Blender has evaluated the frame, including work done before it."""
     if frames[-1].characters:
         frames[-1].deform = _since(frames[-1].ended)
     else:
@@ -73,14 +73,14 @@ def skinned(begin: float) -> None:
 
 
 def drawing_begins() -> None:
-    """Blender has evaluated what was written, and begins to draw a view."""
+    """Note that Blender has evaluated written values and begins to draw a view."""
     _drawing.now = perf_counter()
     if not frames[-1].deform:
         frames[-1].deform = _since(frames[-1].ended)
 
 
 def drawing_ends() -> None:
-    """Blender has told the graphics card what to draw."""
+    """Note that Blender has finished its drawing calls."""
     frames[-1].drawing = _since(_drawing.now)
 
 
@@ -89,7 +89,7 @@ def _since(moment: float) -> float:
 
 
 def lines() -> list[Sentence]:
-    """What the overlay shows: medians of the last frames, in ms."""
+    """Lines of the overlay: medians of the last frames in ms."""
     seen = [f for f in frames if f.characters]
     if not seen:
         return [told("Risorius: no frame yet")]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the eyes look: at their target, both at one point, with lids that follow.
+"""Gaze: both eyes look at their target, and lids follow.
 
-What the look controls have to add is found on the rig itself, because they also move the eyes'
-centres and turn them a little aside: at most a few steps, always from the same start, so that a
-frame depends on nothing but its own controls.
+The values of the look controls are found by evaluating the rig, because these controls also move
+the centres of the eyes and turn them slightly aside. A few steps from a fixed start suffice, so a
+frame depends on its own controls only.
 """
 
 from __future__ import annotations
@@ -32,14 +32,15 @@ _LIDS = 0.5  # how far the lids go at full gaze and full amount
 
 @dataclass(frozen=True)
 class Target:
-    """What the eyes look at.
+    """The target of the eyes.
 
     Both in the control armature's axes, for a head that is not turned.
 
     Attributes:
-        rest: where the target stands at rest: from there the eyes look ahead.
-        moved: how far it is from there.
-        meet: 0: both eyes turn as far as the target went, 1: both look at the target.
+        rest: rest place of the target, at which the eyes look ahead.
+        moved: displacement from the rest place.
+        meet: 0: both eyes turn by the displacement of the target, 1: both look at the target
+            itself.
     """
 
     rest: Vector
@@ -53,13 +54,13 @@ def target_of(
     turns: Mapping[str, Quaternion],
     local: Vector | None,
 ) -> Target | None:
-    """What the eyes of a character look at, or None where their target rests.
+    """The Target of a character, or None if it is at rest.
 
     Args:
         seen: the evaluated control armature.
         live: the character's Runtime.
         turns: of "neck" and "head" in the armature's axes, with the body's.
-        local: how far the target was moved, with layers, in its own axes; None where it rests.
+        local: displacement of the target with layers, in its own axes; None at rest.
     """
     bone = seen.pose.bones.get("eyes")
     if bone is None:
@@ -111,18 +112,18 @@ def asked(
     centres: Mapping[str, Vector],
     maximum: float,
 ) -> dict[str, Float]:
-    """The yaw and pitch that the look controls are to add, by side.
+    """The yaw and pitch for the look controls to add, by side.
 
     Args:
         live: the character's Runtime.
-        raw: float32[R], the controls; the look controls are taken at rest, so that what the
-            animator set there is added and not undone.
-        target: what the eyes look at.
+        raw: float32[R], the controls; look controls are set to rest for the search, so that values
+            set by the animator are added and not undone.
+        target: the Target.
         centres: the eyes at rest, by side, in the armature's axes.
         maximum: of the controls.
 
     Returns:
-        side -> float64[2] radians, as far as the controls reach.
+        side -> float64[2] radians, within the range of the controls.
     """
     if not target.meet:
         return {side: _idle_turn(target, centre) for side, centre in centres.items()}
@@ -151,7 +152,8 @@ def asked(
 
 
 def _idle_turn(target: Target, centre: Vector) -> Float:
-    """How far an eye turns that only goes with the target; to the bit as in files of before."""
+    """The rotation of an eye that follows the displacement of the target only; equal to the bit in
+    older files."""
     start = target.rest - centre
     before, after = yaw_pitch(start), yaw_pitch(start + target.moved)
     return np.array((after[0] - before[0], after[1] - before[1]))
@@ -160,7 +162,7 @@ def _idle_turn(target: Target, centre: Vector) -> Float:
 def _error(
     live: runtime.Runtime, deltas: NDArray[np.float32], side: str, centre: Vector, target: Target
 ) -> Float:
-    """How far an eye looks past what it is to look at: yaw and pitch."""
+    """Error of an eye's direction to its target: yaw and pitch."""
     joint, ahead = live.anchors.eyes.get(side), _AHEAD
     still, rest = np.array(centre[:], np.float64), np.array(target.rest[:], np.float64)
     there = still
@@ -191,7 +193,7 @@ def add_look(
     pitch: float,
     maximum: float,
 ) -> None:
-    """Add angles to the look controls of one eye, as far as these reach.
+    """Add angles to the look controls of one eye, within their range.
 
     Args:
         live: the character's Runtime.
@@ -212,13 +214,13 @@ def frame_of(
     deltas: NDArray[np.float32],
     turns: Mapping[str, Quaternion] | None = None,
 ) -> tuple[Float, Float]:
-    """Where a joint is and how it is turned, in the armature's axes.
+    """Place and rotation of a joint, in the armature's axes.
 
     Args:
         live: the character's Runtime.
-        joint: its number in the DNA.
+        joint: its index in the DNA file.
         deltas: float32[J, 9] of a Pose.
-        turns: of "neck" and "head", added as the bones of the rig get them.
+        turns: rotations of "neck" and "head", added as on the bones of the rig.
 
     Returns:
         float64[3] and float64[3, 3]; scales of joints are left out.
@@ -239,7 +241,7 @@ def frame_of(
 
 
 def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion]) -> Float | None:
-    """What the neck's or head's turn gives a joint, or None."""
+    """The rotation that a joint gets from neck or head, or None."""
     if joint == live.anchors.head and "head" in turns:
         return np.array(turns["head"].to_matrix())
     if joint in live.anchors.neck and "neck" in turns:
@@ -249,7 +251,7 @@ def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion])
 
 
 def _unturned(live: runtime.Runtime, point: Float, turns: Mapping[str, Quaternion]) -> Float:
-    """A point that does not turn with the head, as it stands to a head that is not turned."""
+    """A point fixed in the world, in the space of the unturned head."""
     head = live.anchors.head
     if head is None or not turns:
         return point
@@ -262,12 +264,12 @@ def _unturned(live: runtime.Runtime, point: Float, turns: Mapping[str, Quaternio
 def follow_lids(
     live: runtime.Runtime, raw: NDArray[np.float32], amount: float, maximum: float
 ) -> None:
-    """Let the lids go along with a gaze up or down.
+    """Move the lids with a gaze up or down.
 
     Args:
         live: the character's Runtime.
         raw: float32[R] with the look controls; the lids' controls are raised in place.
-        amount: 0 leaves them to the rig.
+        amount: 0: only the rig moves them.
         maximum: of the controls.
     """
     if amount <= 0.0:

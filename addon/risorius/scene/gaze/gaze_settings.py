@@ -23,33 +23,36 @@ def _changed(self: bpy.types.bpy_struct, _context: bpy.types.Context) -> None:
 
 
 def _all() -> dict[str, object]:
-    """By their names. What a file does not say is as it was before there was such a property."""
+    """The settings by name. A missing setting has the value of files before that setting
+    existed."""
     shared: Any = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "override": _OVERRIDE}
     shared |= {"update": _changed, "translation_context": tables.CONTEXT}
     return {
         "risorius_converge": bpy.props.FloatProperty(
             name="Eyes Meet",
-            description="Both eyes look at the target itself; at 0 they stay side by side. They "
-            "come together as the target leaves its place",
+            description=(
+                "Amount by which both eyes turn towards the target itself; at 0 they stay parallel"
+            ),
             **shared,
         ),
         "risorius_lids": bpy.props.FloatProperty(
             name="Lids Follow",
-            description="How far the lids go along with a gaze up or down, beyond what the rig "
-            "does by itself",
+            description="Motion of the lids with a gaze up or down, in addition to the rig",
             **shared,
         ),
         "risorius_body_turn": bpy.props.FloatProperty(
             name="Body's Turn",
-            description="How much of the turns of the body's neck and head the face takes",
+            description="Share of the turn of the body's neck and head that the face follows",
             default=1.0,
             **shared,
         ),
         "risorius_neck_poses": bpy.props.BoolProperty(
             name="Head Drives Neck Poses",
-            description="Turns of head and neck fill the raw controls that hold the rotations of "
-            "these joints, and poses of the file repair neck and jaw. Off: the sliders of these "
-            "controls lead",
+            description=(
+                "Fill the raw controls of head and neck rotations from their "
+                "joints, so that poses of the file repair neck and jaw. Off: "
+                "the sliders of these controls lead"
+            ),
             default=True,
             override=_OVERRIDE,
             update=_changed,
@@ -65,13 +68,13 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take them away; what files hold of them stays."""
+    """Remove the properties; values in files stay."""
     for name in _all():
         delattr(bpy.types.Object, name)
 
 
 def begin(controls: ArmatureObject, live: runtime.Runtime) -> None:
-    """Give a new face what serves it best.
+    """Set the defaults of a new face.
 
     Args:
         controls: its control armature.

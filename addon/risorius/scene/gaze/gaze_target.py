@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the eyes' target is held by: the head, the world, or an object such as the camera."""
+"""The holder of the eyes' target: the head, the world, or an object such as the camera."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _OWN = "risorius_gaze"  # on an Empty that was made to hold a target
 
 
 def holder_of(controls: ArmatureObject) -> bpy.types.Object | None:
-    """The object that the eyes' target follows, or None where it is the head's."""
+    """The object that the eyes' target follows, or None if it follows the head."""
     hold = _hold_of(controls)
     return hold.target if hold is not None else None
 
 
 def is_own(holder: bpy.types.Object) -> bool:
-    """Whether an object was made to hold a target."""
+    """Whether Risorius made an object as the holder of a target."""
     return holder.get(_OWN) is not None
 
 
@@ -34,7 +34,7 @@ def _hold_of(controls: ArmatureObject) -> bpy.types.CopyLocationConstraint | Non
 
 
 def follow_head(context: Context, controls: ArmatureObject) -> None:
-    """Let the target turn with the head again; it stays where it is seen.
+    """Let the target follow the head again; it keeps its visible place.
 
     Args:
         context: has the evaluated bones.
@@ -60,9 +60,9 @@ def follow_object(context: Context, controls: ArmatureObject, item: bpy.types.Ob
     """Let the eyes look at an object.
 
     Args:
-        context: as of follow_head.
+        context: see follow_head.
         controls: control armature of the character.
-        item: an object that is none of the character's.
+        item: an object outside the character.
     """
     follow_head(context, controls)
     hold = controls.pose.bones["eyes"].constraints.new("COPY_LOCATION")
@@ -72,7 +72,7 @@ def follow_object(context: Context, controls: ArmatureObject, item: bpy.types.Ob
 
 
 def follow_world(context: Context, controls: ArmatureObject) -> bpy.types.Object:
-    """Let the target stay in the world where it is, held by an Empty that can be moved.
+    """Fix the target in the world with a movable Empty.
 
     Args:
         context: the Empty joins its scene.

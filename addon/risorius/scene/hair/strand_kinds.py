@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How strands of hair differ from the card that they follow, by what they are."""
+"""Settings of strands by kind of hair: their differences from the card that they follow."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 _COIL = re.compile(r"radius=(\d+(?:\.\d+)?) pitch=(\d+(?:\.\d+)?)")  # mm
-# Strands that wind together, and how many such locks follow a card: of large coils, of small ones.
+# Strands in a lock and locks for each card: for large coils, for small coils.
 _LOCKS = ((6, 5), (3, 10))
 _LARGE = 0.0013  # metres, radius of a coil
 
@@ -27,12 +27,12 @@ class Kind(NamedTuple):
     radius: float  # at the root, metres
     apart: float  # how far tips part, metres
     cut: float  # of their length, what is cut off at most
-    # Roots stand between the cards' too, or each card would be a tuft: how far over either edge, in
-    # the card's widths, and how far before the card's root, metres.
+    # Roots also stand between cards, so that no card looks like a tuft: distance beyond either edge
+    # in widths of the card, and before its root in metres.
     aside: float
     along: float
-    # Light goes from fibre to fibre where they lie close; single ones over skin are as the picture
-    # shows them, and fibres that let light through would be darker there.
+    # Light passes from fibre to fibre in dense hair. Single hairs over skin use the colour of the
+    # picture, because transmitting fibres would be too dark there.
     dense: bool
     root: float = 1.0  # radius at the root itself, of `radius`, which a strand has a fifth farther
     coil: Coil | None = None
@@ -48,7 +48,7 @@ _KINDS = {  # by what the name of a mesh begins with
 
 
 def kind_of(name: str, told: Mapping[str, str]) -> Kind | None:
-    """How strands of a mesh are.
+    """The kind of strands of a mesh.
 
     Args:
         name: of the mesh, in the file.
@@ -70,6 +70,6 @@ def thicker(kind: Kind, more: float) -> Kind:
 
     Args:
         kind: of cards at LOD 0.
-        more: times as many; below 1 as 1.
+        more: factor of the number; at least 1.
     """
     return kind._replace(each=kind.lock * round(max(1.0, more) * kind.each / kind.lock))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What strands of hair look like."""
+"""The material of strands of hair."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ _FAINTER = 0.75  # of single ones over skin: light passes through them, and a da
 
 
 def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
-    """What strands look like: the picture's colours, where they are dense on fibres that let light
-    through.
+    """The material of strands: colours of the picture; dense hair uses transmitting fibres.
 
     Args:
         item: the cards.
-        dense: whether light goes from fibre to fibre.
+        dense: whether light passes from fibre to fibre.
     """
     cards_look = item.data.materials[0] if item.data.materials else None
     material = bpy.data.materials.new(f"{item.name}_strands")
@@ -38,7 +37,7 @@ def material_of(item: MeshObject, dense: bool) -> bpy.types.Material:
         spot.attribute_name = PLACE
         image: Any = tree.nodes.new("ShaderNodeTexImage")
         image.image = pictures[0].image
-        # Strands lie between the picture's hairs too, where other modes have no colour.
+        # Strands also lie between the hairs of the picture, where other alpha modes have no colour.
         image.image.alpha_mode = "CHANNEL_PACKED"
         tree.links.new(spot.outputs["Vector"], image.inputs["Vector"])
         colour = image.outputs["Color"]
@@ -58,11 +57,11 @@ def _raised(tree: NodeTree, colour: Socket, exponent: float) -> Socket:
 
 
 def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
-    """Fibres for Cycles beside the surface that EEVEE shows.
+    """Add fibres for Cycles beside the surface for EEVEE.
 
     Args:
         tree: of a material.
-        colour: of the picture.
+        colour: colour of the picture.
     """
     output = next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL")
     fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
@@ -72,7 +71,8 @@ def _add_fibre(tree: NodeTree, colour: Socket | None) -> None:
     fibre.inputs["Roughness"].default_value = 0.55
     fibre.inputs["IOR"].default_value = 1.3  # oiled: with 1.55 light from behind makes it grey
     if colour is not None:
-        # Light goes through several fibres: what the picture shows is what they give together.
+        # Light passes several fibres, and the picture shows their sum, so a single fibre is
+        # lighter.
         tree.links.new(_raised(tree, colour, _DEEPER), fibre.inputs["Color"])
     cycles = tree.nodes.new("ShaderNodeOutputMaterial")
     cycles.target, output.target = "CYCLES", "EEVEE"

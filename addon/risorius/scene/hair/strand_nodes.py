@@ -51,7 +51,7 @@ class _Tree:
         return node.outputs[0]
 
     def group(self, number: object, size: int) -> Socket:
-        """Which group of so many a number, from 0 on, belongs to."""
+        """The group of a number, counted from 0, in groups of a given size."""
         return self.math("FLOOR", self.math("DIVIDE", self.math("ADD", number, 0.5), size))
 
     def random(self, low: float, high: float, seed: int, number: object) -> Socket:
@@ -158,15 +158,15 @@ def _aside(g: _Tree, lock: Socket, most: float) -> Node:
 def _slid(
     g: _Tree, mesh: Socket, place: Socket, end: Socket, start: Socket, share: Socket
 ) -> Socket:
-    """Where a vertex of a card is once a strand has slid along it.
+    """Place of a card's vertex after a strand has slid along the card.
 
     Args:
         g: the tree.
         mesh: the cards as they are deformed.
         place: of a vertex.
-        end: where the vertex is.
-        start: number of the vertex of its edge from which the way to the next row is taken.
-        share: of that way.
+        end: place of the vertex.
+        start: index of the vertex on its edge from which the way to the next row starts.
+        share: share of that way.
     """
     first, second = (
         g.taken(mesh, place, i, "FLOAT_VECTOR") for i in (start, g.math("ADD", start, 2))
@@ -180,14 +180,14 @@ def _slid(
 def _store_place(
     g: _Tree, item: MeshObject, mesh: Socket, curves: Socket, where: tuple[Socket, Socket, Socket]
 ) -> Socket:
-    """Curves that know where in the cards' picture each point is.
+    """Curves with the UV coordinates of each point in the picture of the cards.
 
     Args:
         g: the tree.
         item: the cards.
         mesh: the cards as they are deformed.
         curves: the strands.
-        where: numbers of the vertices left and right of a point, and where it is between them.
+        where: indices of the vertices left and right of a point, and its share between them.
     """
     left, right, across = where
     within = g.node("ShaderNodeClamp", {0: across, 1: 0.04, 2: 0.96}).outputs[0]
@@ -219,8 +219,8 @@ def _finish(g: _Tree, curves: Socket, points: int, kind: Kind, unit: float) -> S
     Args:
         g: the tree.
         curves: the strands.
-        points: of each.
-        kind: of them.
+        points: points of each strand.
+        kind: kind of strands.
         unit: metres per Blender unit.
     """
     round_ = g.node("GeometryNodeCurveSplineType", spline_type="CATMULL_ROM")
@@ -260,14 +260,14 @@ def _points_of(item: MeshObject, rows: int, kind: Kind, unit: float) -> int:
 
 
 def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: float) -> Node:
-    """Strands that wind about their way, those of a lock nearly alike; the last node.
+    """Strands that wind about their path, nearly alike within a lock. Returns: the last node.
 
     Args:
         g: the tree.
         curves: smooth strands.
-        points: of each.
-        kind: of them.
-        coil: how they wind.
+        points: points of each strand.
+        kind: kind of strands.
+        coil: radius and pitch of the winding.
         unit: metres per Blender unit.
     """
     radius, pitch = coil.radius / unit, coil.pitch / unit
@@ -278,7 +278,7 @@ def _wound(g: _Tree, curves: Socket, points: int, kind: Kind, coil: Coil, unit: 
         "ADD", g.random(0.0, math.tau, 6, _lock(g, strand, kind)), g.random(-0.6, 0.6, 7, strand)
     )
     angle = g.math("ADD", g.math("MULTIPLY", way, math.tau / pitch), begin)
-    # From nothing at the root on, or roots would stand in circles.
+    # The radius grows from 0 at the root, so that roots do not form circles.
     far = g.math("MULTIPLY", g.math("MINIMUM", g.math("DIVIDE", way, 2 * radius), 1.0), radius)
     far = g.math("MULTIPLY", far, g.random(0.7, 1.3, 8, strand))
     normal = g.node("GeometryNodeInputNormal").outputs[0]

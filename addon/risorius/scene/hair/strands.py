@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Cards of hair as Blender's hair curves, in renders: curves whose nodes follow the cards.
+"""Cards of hair as Blender's hair curves in renders, with nodes that follow the cards.
 
-Each card is a guide with a width. Strands lie across it, go where its deformed vertices go, and
-take the place of the cards in renders; the viewport and exports keep the cards.
+Each card is a guide with a width. Strands lie across it, follow its deformed vertices, and replace
+the cards in renders. The viewport and exports keep the cards.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ def show(rig: ArmatureObject, unit: float) -> int:
 
 
 def _cards_at_finest(live: runtime.Runtime, name: str) -> int:
-    """How many cards a mesh has at LOD 0, of which a coarser one has fewer and wider ones; 0 where
-    the file does not say so.
+    """The number of cards of a mesh at LOD 0; coarser levels have fewer and wider cards. 0 if the
+    file does not store it.
 
     Args:
         live: of the character.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses between poses: a breakdown of those before and after, nearer to them, nearer to rest."""
+"""Poses between poses: breakdowns of the neighbouring keys, relax or push, to rest."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Neighbours:
 
     Attributes:
         before, after: the poses.
-        share: where the frame lies between them, 0 to 1.
+        share: place of the frame between them, 0 to 1.
     """
 
     before: keying.Pose
@@ -31,7 +31,7 @@ class Neighbours:
 
 
 def key_frames(controls: ArmatureObject, paths: Collection[str] | None = None) -> list[float]:
-    """The frames of a face's keys, each once, in their order.
+    """The frames of a face's keys, sorted and unique.
 
     Args:
         controls: the control armature.
@@ -50,12 +50,12 @@ def key_frames(controls: ArmatureObject, paths: Collection[str] | None = None) -
 def next_key(
     controls: ArmatureObject, frame: float, forward: bool, paths: Collection[str] | None = None
 ) -> float | None:
-    """The frame of the next or the last key, or None where there is none.
+    """The frame of the next or previous key, or None.
 
     Args:
-        controls, paths: as of key_frames.
-        frame: where one stands.
-        forward: the next one, else the one before.
+        controls, paths: see key_frames.
+        frame: current frame.
+        forward: True: next; False: previous.
     """
     frames = key_frames(controls, paths)
     there = [f for f in frames if (f > frame + _AT if forward else f < frame - _AT)]
@@ -73,16 +73,16 @@ def neighbours(
 
     Args:
         controls: the control armature.
-        frame: where one stands.
-        now: what it shows.
+        frame: current frame.
+        now: current pose.
         paths: data paths whose keys count.
         skipped: frames whose keys do not count.
 
     Returns:
-        Neighbours; where there are keys on one side only, its pose is on both.
+        Neighbours; with keys on one side only, both poses are equal.
 
     Raises:
-        FaceError: there is no key on either side.
+        FaceError: neither side has a key.
     """
     frames = [f for f in key_frames(controls, paths) if f not in skipped]
     before = max((f for f in frames if f < frame - _AT), default=None)
@@ -99,12 +99,12 @@ def neighbours(
 
 
 def paths_of(controls: ArmatureObject, labels: Iterable[str], bones: bool) -> set[str]:
-    """The data paths of sliders, and those of the control bones if asked for.
+    """The data paths of sliders and, if wanted, of control bones.
 
     Args:
         controls: the control armature.
         labels: the sliders.
-        bones: whether the bones' are wanted too.
+        bones: whether to include bones.
     """
     own = {parts.property_path(label) for label in labels}
     return own | set(keying.pose_of(controls).bones) if bones else own
@@ -128,11 +128,11 @@ def move(
     Args:
         rig: the character.
         now, goal: the poses.
-        factor: 1 reaches the goal, 0 changes nothing, below 0 goes away from it.
-        paths: data paths of those that move.
+        factor: 1 reaches the goal, 0 changes nothing, below 0 moves away from it.
+        paths: data paths of moving controls.
 
     Returns:
-        The sliders among them.
+        The moved sliders.
     """
     controls = parts.controls_there(rig)
     values = {
@@ -163,7 +163,7 @@ def _blended(
 
 
 def rest_pose(rig: ArmatureObject, now: keying.Pose) -> keying.Pose:
-    """All at rest. Args: rig  the character, now  what it shows, for the names."""
+    """The rest pose. Args: rig the character, now a pose with the wanted names."""
     live = runtime.there(rig)
     rests = dict(zip(live.labels, live.rests, strict=True))
     bones: Mapping[str, tuple[float, ...]] = {

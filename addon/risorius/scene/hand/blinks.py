@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blinks with their timing: as keys of the lids' sliders, or in a layer above them."""
+"""Blinks with timing: as keys of the sliders of the lids, or in a layer above them."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _MARK = "risorius_blinks"  # on the action of a layer of blinks
 
 @dataclass(frozen=True)
 class Blink:
-    """How the eyes close and open, in frames of the scene.
+    """Timing of a blink in frames of the scene.
 
     Attributes:
-        close, hold, open: how long each part lasts.
-        strength: how far the lids close, 0 to 1.
-        offset: by how much the character's right eye is later than its left; negative: earlier.
+        close, hold, open: length of each part.
+        strength: value of closed lids, 0 to 1.
+        offset: delay of the character's right eye; negative: it leads.
         sides: L, R or both.
     """
 
@@ -41,8 +41,8 @@ class Blink:
         """Frames and values of the keys of one eye.
 
         Args:
-            begin: when it begins to close.
-            before, after: what the slider shows where the blink begins and ends.
+            begin: start of closing.
+            before, after: slider values at the start and end of the blink.
         """
         shut = begin + self.close
         most = max(self.strength, before, after)  # an eye that is shut already stays so
@@ -61,16 +61,16 @@ def sliders(live: runtime.Runtime, sides: str) -> dict[str, str]:
 
 
 def key(rig: ArmatureObject, frame: float, blink: Blink, rules: keying.Rules) -> int:
-    """Key a blink on the sliders; keys that lay within it go.
+    """Key a blink on the sliders; keys within it are removed.
 
     Args:
         rig: the character.
-        frame: where it begins.
+        frame: first frame.
         blink: its timing.
-        rules: how keys are made.
+        rules: settings of keys.
 
     Returns:
-        How many keys were set.
+        The number of keys.
     """
     controls, count = parts.controls_there(rig), 0
     face = controls.pose.bones[parts.FACE]
@@ -99,13 +99,13 @@ def layer_of(controls: ArmatureObject) -> layer_properties.RISORIUS_PG_layer | N
 
 
 def add_to_layer(rig: ArmatureObject, frame: float, blink: Blink, name: str) -> None:
-    """Put a blink into the layer of blinks, which counts where it closes the eyes further.
+    """Add a blink to the layer of blinks, which takes effect if it closes the eyes further.
 
     Args:
         rig: the character.
-        frame: where it begins.
+        frame: first frame.
         blink: its timing.
-        name: of the layer, where it is new.
+        name: of a new layer.
     """
     controls = parts.controls_there(rig)
     layer = layer_of(controls)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sliders that an animator keeps at hand: of this file, else the user's own."""
+"""Favourite sliders: of this file, or of the user."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def of(controls: ArmatureObject, users: str) -> list[str]:
 
 
 def toggle(controls: ArmatureObject, names: Collection[str], users: str) -> str:
-    """Put sliders among the favourites of a file, or take them away.
+    """Add sliders to the favourites of a file, or remove them.
 
     Args:
         controls: control armature of the face.
-        names: sliders; where all are there already they go.
-        users: as of `of`.
+        names: sliders; if all are favourites, they are removed.
+        users: see `of`.
 
     Returns:
-        The new list, a line each.
+        The new list, one name in each line.
     """
     there = of(controls, users)
     if all(name in there for name in names):

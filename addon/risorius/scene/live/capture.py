@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Live capture onto characters: a timer writes the newest face to the sliders and the head bone.
 
-Packets are received on a thread of `risorius.live`, which knows nothing of Blender. The timer takes
-the newest frame, if there is a new one, and has it written. What was there before is put back at
-the end, however it ends.
+A thread of `risorius.live` receives packets and uses no Blender data. The timer writes the newest
+frame. At the end the earlier values are restored in every case.
 """
 
 from __future__ import annotations
@@ -71,10 +70,10 @@ def start(rig: ArmatureObject, settings: Settings) -> Session:
 
 
 def stop(controls: bpy.types.Object | None) -> bool:
-    """End the capture of a character and put back what was there before.
+    """End the capture of a character and restore its earlier values.
 
     Returns:
-        Whether there was one. A recording that was not finished waits, see waiting.
+        Whether a capture ran. An unfinished recording waits, see waiting.
     """
     session = sessions.of(controls)
     if session is None:
@@ -92,7 +91,7 @@ def stop_all() -> None:
 
 
 def _end(session: Session) -> None:
-    """Close a session whatever state its character is in: nothing of the user's goes with it."""
+    """Close a session in any state of its character, without losing the user's recordings."""
     _lay_by(session)
     try:
         controls = session.controls()
@@ -113,16 +112,16 @@ def _lay_by(session: Session) -> Recording | None:
 
 
 def address() -> str:
-    """What a phone's app takes for this computer; "" where it is in no network."""
+    """The address of this computer for a phone's app; "" without a network."""
     return native.part("live").own_address()
 
 
 def begin_take(session: Session, frame: float) -> None:
-    """Record from now.
+    """Begin a recording.
 
     Args:
         session: of the character.
-        frame: of the scene at which the take is to begin.
+        frame: first frame of the take in the scene.
     """
     take = session.receiver.record(session.subject)
     session.recording = Recording(take, session.shaper, frame)
@@ -131,18 +130,18 @@ def begin_take(session: Session, frame: float) -> None:
 def finish_take(
     session: Session, rig: ArmatureObject, scene: bpy.types.Scene
 ) -> clip_actions.Report | None:
-    """Stop recording; the character plays what was recorded.
+    """Stop recording and let the character play the take.
 
     Args:
         session: a Session that records.
         rig: the character.
-        scene: gives the rate; its frame when the recording began is the take's first.
+        scene: gives the rate.
 
     Returns:
-        clip_actions.Report, or None where nothing came.
+        clip_actions.Report, or None if nothing was received.
 
     Raises:
-        clip_units.ClipError: as finish; what was recorded then waits to be finished again.
+        clip_units.ClipError: see finish; the recording then waits.
     """
     recording = _lay_by(session)
     return recordings.finish(recording, rig, scene) if recording is not None else None
@@ -153,7 +152,7 @@ def _tick() -> float | None:
     try:
         return _beat()
     except Exception:
-        # Blender drops a timer that fails; what it fed must not go on listening.
+        # Blender drops a failing timer, so its sessions must end too.
         _state.error = "Live capture ended by an error, which the console shows."
         for session in sessions.running():
             with contextlib.suppress(Exception):  # the first error is the one to show

@@ -21,14 +21,14 @@ _HEAD = "head"
 
 
 def show(session: Session, controls: ArmatureObject) -> bool:
-    """Write the newest face to a character, if it is a new one.
+    """Write the newest face to a character.
 
     Args:
         session: of the character.
         controls: its control armature.
 
     Returns:
-        Whether there was one.
+        Whether a new face was written.
     """
     _follow_ranges(session, controls)
     frame = session.receiver.latest(session.subject)
@@ -54,7 +54,7 @@ def show(session: Session, controls: ArmatureObject) -> bool:
 
 
 def _follow_ranges(session: Session, controls: ArmatureObject) -> None:
-    """Take over the ranges of the face where they may have changed; the face is shown anew."""
+    """Use the current ranges of the face; the face is written again if they changed."""
     if session.ranges_seen != range_properties.changes():
         session.ranges_seen = range_properties.changes()
         session.shaper.ranges = range_properties.of(controls)
@@ -96,7 +96,7 @@ def _rotation(bone: bpy.types.PoseBone) -> tuple[str, tuple[float, ...]]:
 
 
 def _as_quaternion(mode: str, values: Sequence[float]) -> Quaternion:
-    """What _rotation gave, for a bone that is turned in another way by now."""
+    """Convert a result of _rotation for a bone whose rotation mode has changed."""
     if mode == "QUATERNION":
         return Quaternion(values).normalized()
     if mode == "AXIS_ANGLE":
@@ -116,7 +116,7 @@ def _rotate(bone: bpy.types.PoseBone, turn: Quaternion) -> None:
 
 
 def put_back(session: Session, controls: ArmatureObject) -> None:
-    """Write the values of before the capture.
+    """Restore the values before the capture.
 
     Args:
         session: of the character.

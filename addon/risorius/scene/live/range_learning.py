@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The range of a person from what live capture has received in the last seconds."""
+"""The range of a person from the last seconds of live capture."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from .sessions import Session
 
 
 def recent_clip(session: Session, seconds: float) -> native.Clip:
-    """What a session has shown lately, as captured: without ranges, gain, smoothing, neutral.
+    """The recent frames of a session as captured: without ranges, gain, smoothing and neutral.
 
     Args:
         session: of the character.
-        seconds: how far back.
+        seconds: length.
 
     Returns:
         risorius.Clip of raw controls.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Recordings of live capture: they become actions, or wait in memory until somebody decides.
+"""Recordings of live capture: they become actions, or wait in memory for the user.
 
-One that cannot become an action when it ends, whose face went away or whose file is closed waits
-until it is finished or thrown away: nobody acts the same twice.
+A recording waits if it cannot become an action at its end, or if its face or file is gone, because
+a performance cannot be repeated.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ _waiting: list[Recording] = registry.keep("recordings.waiting", list, ("quit",))
 
 @dataclass
 class Recording:
-    """What was recorded, or is being recorded.
+    """A finished or running recording.
 
     Attributes:
         take: risorius.live.Take.
-        shaper: risorius.live.Shaper, of the capture that it belongs to.
-        frame: of the scene, when it began.
+        shaper: risorius.live.Shaper, of its capture.
+        frame: frame of the scene at its start.
         face: name of the control armature.
     """
 
@@ -59,10 +59,10 @@ def discard(recording: Recording) -> None:
 def finish(
     recording: Recording, rig: ArmatureObject, scene: bpy.types.Scene
 ) -> clip_actions.Report:
-    """Let a character play a recording that waits; then it waits no more.
+    """Let a character play a waiting recording and remove it from the waiting ones.
 
     Args:
-        recording: of waiting(); made with this character or with another.
+        recording: from waiting(); made with this or another character.
         rig: the character.
         scene: gives the rate.
 
@@ -70,7 +70,8 @@ def finish(
         clip_actions.Report.
 
     Raises:
-        clip_units.ClipError: nothing of it is for this face, it is longer than Blender can play,
+        clip_units.ClipError: none of its controls fits this face, it is longer than Blender can
+        play,
             or the NLA is being edited.
     """
     controls, take = parts.controls_there(rig), recording.take

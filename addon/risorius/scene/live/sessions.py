@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Who follows whom: a Session for each captured character, and the receivers that they share.
+"""Sessions of captured characters, and the receivers that they share.
 
-No Blender object is kept: a character is found anew each time, and may have gone away.
+No Blender object is kept: a character is found again each time and may be deleted.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _receivers: dict[tuple[str, int, str], native.Receiver] = registry.table(
 
 @dataclass
 class Settings:
-    """What the user chose.
+    """Settings of a capture.
 
     Attributes:
-        source: "livelink" or "osc"; port, everywhere: where to listen, to the network or not.
-        subject: the phone; "" for the one heard first.
+        source: "livelink" or "osc"; port, everywhere: port, and whether to listen to the network.
+        subject: name of the phone; "" for the first one received.
         mapping: name or file of the mapping to controls.
-        smoothing: 0 to 1; gain: on all units; head_gain: on the head's turn, 0 for none.
+        smoothing: 0 to 1; gain: on all units; head_gain: of head rotations, 0 for none.
     """
 
     source: str = "livelink"
@@ -49,20 +49,21 @@ class Settings:
 
 @dataclass
 class Session:
-    """One character that follows one subject.
+    """A character that follows a subject.
 
     Attributes:
-        uid: of the control armature; name: as it was last seen, to find it soon.
+        uid: of the control armature; name: its last name, to find it quickly.
         key: of its receiver.
         shaper: risorius.live.Shaper.
-        subject: whom it follows; "" for the one heard first.
-        sequence: of the frame that was written last.
+        subject: name of the subject; "" for the first one received.
+        sequence: number of the last written frame.
         before: slider -> value before the capture.
-        turn: the head bone's (rotation mode, rotation as that mode keeps it) before it, or None.
-        recording: Recording, while one is made.
-        recent: the frames that were shown lately, of any subject: a minute of 60 a second.
-        ranges_seen: range_properties.changes() when the shaper got the ranges of the face.
-        names, sliders: the control names of the last frame, and (slider, place) of those that this
+        turn: the head bone's (rotation mode, rotation as that mode keeps it) before the capture, or
+            None.
+        recording: the running Recording, or None.
+        recent: recent frames of any subject: one minute at 60 a second.
+        ranges_seen: value of range_properties.changes() when the shaper got the ranges.
+        names, sliders: the control names of the last frame, and (slider, place) of names that this
             character has.
     """
 
@@ -85,7 +86,7 @@ class Session:
         return _receivers[self.key]
 
     def controls(self) -> ArmatureObject | None:
-        """The control armature, or None where it went away."""
+        """The control armature, or None if it was deleted."""
         item = cast("ArmatureObject | None", bpy.data.objects.get(self.name))
         if item is None or item.session_uid != self.uid:
             found = (o for o in bpy.data.objects if o.session_uid == self.uid)
@@ -107,15 +108,15 @@ def of(controls: bpy.types.Object | None) -> Session | None:
 
 
 def begin(controls: ArmatureObject, shaper: native.Shaper, settings: Settings) -> Session:
-    """Let a character follow a subject; it must have no session.
+    """Let a character follow a subject; it must not have a session.
 
     Args:
         controls: its control armature.
-        shaper: of the settings' mapping.
+        shaper: shaper with the mapping of the settings.
         settings: Settings.
 
     Raises:
-        risorius.live.LiveError: the port cannot be had; python-osc is missing.
+        risorius.live.LiveError: the port is in use, or python-osc is missing.
     """
     live = native.part("live")
     host = live.EVERYWHERE if settings.everywhere else live.THIS_MACHINE
@@ -131,11 +132,11 @@ def begin(controls: ArmatureObject, shaper: native.Shaper, settings: Settings) -
 
 
 def apply_settings(session: Session, settings: Settings) -> None:
-    """Take over what can change while it runs: subject, smoothing, gains.
+    """Apply settings that can change during a capture: subject, smoothing, gains.
 
     Args:
         session: of the character.
-        settings: as they are now; source, port and mapping are left as they were at the start.
+        settings: new settings; source, port and mapping keep their values.
     """
     session.subject = settings.subject
     _reserve(session.key)
@@ -169,6 +170,6 @@ def neutral_now(session: Session) -> bool:
 
 
 def forget_neutral(session: Session) -> None:
-    """Take what comes as it is again."""
+    """Use received faces unchanged again."""
     session.shaper.capture(None)
     session.sequence = 0

@@ -24,12 +24,13 @@ def levels_of(item: MeshObject) -> list[int]:
 
 
 def shows(item: MeshObject, level: int) -> bool:
-    """Whether a level shows a mesh, as each does where nothing is said. Args: item  the mesh."""
+    """Whether a level shows a mesh; a mesh without levels is always shown. Args: item the mesh."""
     return parts.LODS not in item or level in levels_of(item)
 
 
 def heads(rig: ArmatureObject) -> list[MeshObject]:
-    """The head of the finest level that is built, else all meshes of that. Args: rig  of them."""
+    """The head mesh of the finest existing level, or all meshes of that level. Args: rig deforming
+    armature."""
     items = parts.meshes_of(rig)
     first = min((min(levels_of(item), default=0) for item in items), default=0)
     shown = [item for item in items if shows(item, first)]
@@ -76,12 +77,12 @@ def distances(rig: ArmatureObject) -> list[float]:
 
 
 def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) -> None:
-    """Let the distance to the scene's camera choose the level, or no longer.
+    """Turn the choice of the level by camera distance on or off.
 
     Args:
         rig: the deforming armature.
-        enable: whether it shall.
-        size: of the face in Blender units, for the distances where there are none yet.
+        enable: True: on.
+        size: size of the face in Blender units, for initial distances.
     """
     levels = built(rig)
     if enable and levels and not distances(rig):
@@ -139,9 +140,9 @@ def _distance(seen: ArmatureObject, camera: bpy.types.Object) -> float:
 
 
 def _hide(rig: ArmatureObject, level: int, flag: str) -> None:
-    """Hide what the level does not show; what the user hid stays hidden.
+    """Hide the meshes of other levels; meshes that the user hid stay hidden.
 
-    A flag that is not what was last written here was set by the user.
+    A flag that differs from the last written value was set by the user.
     """
     for item in parts.meshes_of(rig):
         written, users = f"{parts.HIDDEN_PREFIX}{flag}", f"{parts.HIDDEN_PREFIX}user_{flag}"

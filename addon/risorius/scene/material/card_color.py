@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The colour of hair in the solid view: as light and as thin as the picture on its cards is."""
+"""The colour of hair in the solid view: mean colour and opacity of the picture on its cards."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _LEAST = 0.02  # opacity: below it nobody sees where hair is
 
 
 def color_of(look: Look, mesh: plans.MeshPlan) -> Color | None:
-    """Mean colour and mean opacity of a picture where cards show it.
+    """Mean colour and opacity of the part of a picture that cards show.
 
-    The solid view has one colour for each material. Cards of one dark, half clear colour are
-    blocks and specks in it: a card is clear for the most part, and overlaps many others.
+    The solid view has one colour for each material. Cards of one dark, half transparent colour
+    would look like blocks, because most of a card is transparent and overlaps other cards.
 
     Args:
         look: of the mesh's material.

@@ -32,7 +32,7 @@ def build(graph: Graph, look: Look) -> None:
     turns = _THREADS / look.unit
     across = graph.math("SINE", graph.math("MULTIPLY", graph.math("ADD", x, y), turns))
     along = graph.math("SINE", graph.math("MULTIPLY", z, turns))
-    # Far away a thread is smaller than a pixel, and a few samples of it are grains that flicker.
+    # Far away a thread is smaller than a pixel and would flicker.
     away = graph.node("CameraData").outputs["View Distance"]
     span = (_FAR - _NEAR) * look.unit
     near = graph.math("DIVIDE", graph.math("SUBTRACT", _FAR * look.unit, away), span, clamp=True)

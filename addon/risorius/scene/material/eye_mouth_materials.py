@@ -22,8 +22,8 @@ _GUM, _GUM_DARK = (0.44, 0.14, 0.12), (0.28, 0.065, 0.06)
 _TONGUE, _TONGUE_DARK = (0.45, 0.15, 0.14), (0.30, 0.065, 0.065)
 _CARUNCLE, _CARUNCLE_DARK = (0.58, 0.27, 0.23), (0.44, 0.15, 0.13)
 _LASH, _LASH_TIP = (0.010, 0.006, 0.004), (0.045, 0.026, 0.016)
-# Lips and cheeks keep light from what lies deep in a mouth. Where nothing casts shadows (Material
-# Preview, exports) molars would be as bright as incisors, a white wall behind the corner.
+# Lips and cheeks shade the inside of a mouth. Without cast shadows (Material Preview, exports)
+# molars would be as bright as incisors.
 _SHADED = (
     (0.12, (1.0,) * 3),
     (0.24, (0.77, 0.75, 0.73)),
@@ -221,7 +221,7 @@ def _shade(graph: Graph) -> Socket:
 
 
 def _shine(graph: Graph, shade: Socket | None, coat: float, gloss: float) -> None:
-    """A wet coat and what is under it, both duller where it is dark."""
+    """A wet coat and the surface under it, both duller in dark places."""
     if shade is None:
         graph.set(Coat_Weight=coat, Specular_Ior_Level=gloss)
         return
@@ -256,7 +256,7 @@ def _flesh(
 
 
 def lashes(graph: Graph, look: Look) -> None:
-    """Hairs on cards: by an alpha or colour texture, else strands across the UV map.
+    """Hairs on cards: from an alpha or colour texture, or strands across the UV map.
 
     Args:
         graph: of the material, with its shader and its output.

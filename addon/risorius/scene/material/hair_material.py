@@ -42,9 +42,9 @@ def build(graph: Graph, look: Look) -> None:
 
 
 def outward_normal(graph: Graph) -> Socket:
-    """The normal that the file has, on both sides of a card: it is the skin's, not the card's.
+    """The normal of the file on both sides of a card, because it is the normal of the skin.
 
-    Renderers turn a normal round where a face is seen from behind.
+    Renderers flip a normal on the back of a polygon.
     """
     geometry = graph.node("NewGeometry")
     both = graph.math("MULTIPLY_ADD", geometry.outputs["Backfacing"], -2.0, 1.0)
@@ -56,7 +56,7 @@ def outward_normal(graph: Graph) -> Socket:
 
 
 def see_through(graph: Graph) -> None:
-    """Light and sight pass where there is no hair; EEVEE dithers it."""
+    """Make places without hair transparent; EEVEE dithers them."""
     material = graph.material
     material.surface_render_method = "DITHERED"
     material.use_transparency_overlap = False

@@ -30,18 +30,19 @@ COLOR_SPACES = (
 )
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
 PACK_LIMIT = 64 << 20  # bytes; larger files stay outside, or a .blend would grow to gigabytes
-# What one image may take when it is unfolded, and all of an import together: this much, and so
-# many times their files. A flat picture of 8192 pixels packs to almost nothing and is taken.
+# Largest unpacked size of one image, and of all images of an import, and the largest ratio to their
+# files. An image must exceed both to be refused: a flat picture of 8192 pixels packs to almost
+# nothing and is accepted.
 _ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
 TILE = 512  # pixels of one tile of the mask atlas, each side
 
 
 def set_color_space(image: bpy.types.Image, data: bool) -> None:
-    """Say whether an image holds colours or numbers; no name of a space needs to exist.
+    """Set whether an image contains colours or numbers, in any colour configuration.
 
     Args:
         image: a loaded image.
-        data: numbers, such as normals or masks, that no colour management may touch.
+        data: True: numbers, such as normals or masks, without colour management.
     """
     settings: Any = image.colorspace_settings
     if not data and image.is_float:
@@ -103,7 +104,7 @@ class Images:
         self._room, self._files = 0, 0  # bytes, of all images that were loaded
 
     def load(self, path: Path | None, data: bool = False) -> bpy.types.Image | None:
-        """The image of a file, or None where there is none or it cannot be read.
+        """The image of a file, or None if it is missing or unreadable.
 
         Args:
             path: of the file; None gives None.
@@ -117,7 +118,7 @@ class Images:
         return self._loaded[key]
 
     def small(self, path: Path) -> NDArray[np.float32] | None:
-        """float32[TILE, TILE, 4]: a file's stored numbers; None where it cannot be read.
+        """float32[TILE, TILE, 4]: a file's stored numbers; None if it is unreadable.
 
         Args:
             path: of the file.
@@ -181,7 +182,8 @@ class Images:
     def atlas(
         self, name: str, masks: Mapping[str, texture_search.Mask]
     ) -> tuple[bpy.types.Image | None, dict[str, tuple[int, int, int, int]]]:
-        """One image with the masks of many regions, three to a tile: an engine has few samplers.
+        """One image with the masks of many regions, three in each tile, because a render engine has
+        few samplers.
 
         Args:
             name: of the image.
@@ -232,7 +234,7 @@ class Images:
 
 
 def _small_copy(path: Path) -> NDArray[np.float32] | None:
-    """float32[TILE, TILE, 4] of a file's stored numbers, or None where it cannot be read."""
+    """float32[TILE, TILE, 4] of a file's stored numbers, or None if it is unreadable."""
     try:
         _room_for(path)
         image = bpy.data.images.load(str(path), check_existing=False)
@@ -259,6 +261,6 @@ def mean_of(path: Path) -> NDArray[np.float32] | None:
 
 
 def offsets_in(path: Path | None) -> bool:
-    """Whether a wrinkle map holds differences about 0.5 instead of whole colours or normals."""
+    """Whether a wrinkle map stores differences around 0.5 instead of colours or normals."""
     mean = mean_of(path) if path is not None else None
     return mean is not None and bool(abs(mean[:3] - 0.5).max() < 0.06)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the builder of one material knows: sizes, areas, textures."""
+"""Inputs of building one material: sizes, areas, textures."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from . import image_loading
 
 @dataclass
 class Look:
-    """What the builder of one material knows.
+    """Inputs of building one material.
 
     Attributes:
         kind: as in MeshPlan.
         base: mesh name without LOD.
         rig: the deforming armature, whose `maps` array drives the map values.
         extent: float64[3] size of the mesh in Blender units.
-        unit: distance of the eyes, in Blender units: the measure of all patterns.
+        unit: distance of the eyes in Blender units; patterns scale with it.
         vertices: of the finest mesh.
         has_uvs: whether it has a UV map.
         simple: leave out subsurface, relief and maps.
         cornea: whether the face has a mesh of corneas over its eyes.
-        uses: what the animated maps do.
+        uses: uses of the animated maps.
         areas: areas of a face that this mesh has.
         border: whether the mesh has an open border away from the face.
         found: texture_search.TexturePlan.
-        images: loads them.
-        atlas, places: image with the wrinkle masks, and where in it each region's is.
-        offsets: role -> whether that wrinkle map holds differences; filled when asked.
+        images: loader of images.
+        atlas, places: image with the wrinkle masks, and the place of each region in it.
+        offsets: role -> whether that wrinkle map stores differences; filled when needed.
     """
 
     kind: str
@@ -70,7 +70,7 @@ class Look:
         return None if path is None else self.images.small(path)
 
     def is_offset(self, role: str) -> bool:
-        """Whether the wrinkle map of this role holds differences about 0.5."""
+        """Whether the wrinkle map of this role stores differences around 0.5."""
         if role not in self.offsets:
             self.offsets[role] = image_loading.offsets_in(self.found.of(self.base, role))
         return self.offsets[role]

@@ -17,8 +17,8 @@ from .image_loading import Images
 from .look import Look
 from .nodes import Graph
 
-# What the solid view shows. Lashes are cards: opaque ones would cover the lids with black bands.
-# Those of a picture have its colour and opacity, see card_color.
+# Colours of the solid view. Lashes are cards: opaque ones would cover the lids with black bands.
+# Cards with a picture get its colour and opacity, see card_color.
 _VIEW_COLORS = {
     "skin": (0.62, 0.36, 0.27, 1.0),
     "eyes": (0.75, 0.70, 0.66, 1.0),
@@ -50,7 +50,7 @@ def build_materials(
         plan: the CharacterPlan.
         rig: the deforming armature, whose `maps` array drives the map values.
         built: mesh objects, in the order of the plan's meshes.
-        made: list that every new datablock is put on.
+        made: receives every new datablock.
         found: texture_search.TexturePlan; None for no textures.
         simple: build the cheap variant: no subsurface, relief or maps.
 
@@ -134,8 +134,8 @@ def _build(
     _choose_picture(look, graph)
     if look.kind != "eyes":
         return [material]
-    # The same surface in a second slot: the solid view has one colour for each material, and
-    # without an iris nobody sees where an eye looks.
+    # A copy in a second slot: the solid view has one colour for each material, and a visible iris
+    # shows the direction of an eye.
     iris = material.copy()
     made.append(iris)
     iris.name, iris.diffuse_color = f"{material.name}_iris", _IRIS_COLOR
@@ -145,8 +145,8 @@ def _build(
 def _choose_picture(look: Look, graph: Graph) -> None:
     """Make the colour's image active: the solid view's *Texture* shows the active one.
 
-    Without one a pattern is active, for which it shows the material's colour; else it would take
-    the first image that there is, such as a mask.
+    Without an image a pattern becomes active, so that the view shows the material's colour.
+    Otherwise it would show the first image, such as a mask.
     """
     pictures = [n for n in graph.tree.nodes if n.type == "TEX_IMAGE" and n.image is not None]
     colors = [n for n in pictures if n.image == look.image("color")]
@@ -194,7 +194,7 @@ def _face_frame(plan: plans.CharacterPlan) -> skin_folds.FaceFrame | None:
 def _add_attributes(
     mesh: bpy.types.Mesh, plan: plans.MeshPlan, frame: skin_folds.FaceFrame | None
 ) -> set[str]:
-    """Write what the material of this kind reads; returns the areas that a skin has."""
+    """Write the attributes for this kind of material. Returns: the areas of a skin."""
     if not len(plan.positions):
         return set()
     if plan.kind == "eyes":
@@ -222,7 +222,7 @@ def _add(
 def _add_border(
     mesh: bpy.types.Mesh, points: NDArray[np.float32], frame: skin_folds.FaceFrame
 ) -> None:
-    """Write how near an open border is; nothing where there is none away from the face."""
+    """Write the distance to an open border away from the face, if there is one."""
     edges = np.empty(2 * len(mesh.edges), np.int32)
     mesh.edges.foreach_get("vertices", edges)
     used = np.empty(len(mesh.loops), np.int32)

@@ -64,7 +64,7 @@ class Graph:
         Args:
             operation: of Blender's Math node, "ADD" and the like.
             values: numbers or sockets for its inputs, in their order.
-            clamp: whether the result is held within 0 and 1.
+            clamp: clamp the result to 0..1.
         """
         node = self.node("Math")
         node.operation, node.use_clamp = operation, clamp
@@ -76,8 +76,8 @@ class Graph:
         """The sum of numbers or sockets; 0 for none.
 
         Args:
-            values: what is added.
-            clamp: whether the sum is held within 0 and 1.
+            values: numbers or sockets to add.
+            clamp: clamp the sum to 0..1.
         """
         result = values[0] if values else 0.0
         for value in values[1:]:
@@ -101,7 +101,7 @@ class Graph:
         """Mix two colours.
 
         Args:
-            factor: 0 gives a, 1 gives b; held within 0 and 1.
+            factor: 0 gives a, 1 gives b; clamped to 0..1.
             a: colour or socket.
             b: colour or socket.
             blend: of Blender's Mix node, "MIX", "MULTIPLY" and the like.
@@ -154,9 +154,9 @@ class Graph:
 
         Args:
             vector: the place.
-            scale: how many cells of noise lie on a unit of vector.
-            detail: how many octaves are added.
-            roughness: how much each octave counts beside the one before.
+            scale: cells of noise for each unit of vector.
+            detail: number of octaves.
+            roughness: factor of each octave relative to the one before.
         """
         node = self.node("TexNoise")
         self.put(vector, node.inputs["Vector"])
@@ -170,7 +170,7 @@ class Graph:
 
         Args:
             vector: the place.
-            scale: how many cells lie on a unit of vector.
+            scale: cells for each unit of vector.
             feature: of Blender's Voronoi node: "F1" the distance to the nearest point, or another.
         """
         node = self.node("TexVoronoi")
@@ -222,10 +222,10 @@ class Graph:
         """An image texture node.
 
         Args:
-            image: what it shows.
-            vector: where; None for the UV map.
+            image: the image.
+            vector: coordinates; None for the UV map.
             label: shown as its title.
-            clamp: whether its edge is held outside of it instead of repeating it.
+            clamp: extend the edge instead of repeating the image.
         """
         node = self.node("TexImage", label)
         node.image = image
@@ -269,7 +269,7 @@ class Graph:
             rows[place] = rows.get(place, 0) + 1
 
     def _sources_first(self, sources: Mapping[Node, list[Node]]) -> list[Node]:
-        """Nodes that reach the output, each after all those that feed it.
+        """Nodes connected to the output, each after its sources.
 
         Args:
             sources: the nodes that feed a node.

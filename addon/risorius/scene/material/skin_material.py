@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The skin: subsurface, pores, and what the animated maps do to colour and normals."""
+"""The skin: subsurface, pores, and the effects of animated maps on colour and normals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FRAME = "Animated maps"
 _TONE, _DARK, _RED = (0.60, 0.35, 0.25), (0.50, 0.26, 0.18), (0.54, 0.22, 0.16)
 _FLUSH = (1.0, 0.42, 0.38)
 _CREASE = (0.66, 0.49, 0.45)
-# Radians for each eye distance: how close the folds lie.
+# Density of folds in radians for each distance of the eyes.
 _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # of an area's map: without a painted mask a blush must stay faint
 _PORE_DEPTH = 0.032
@@ -37,7 +37,7 @@ Member = tuple[str, Value]  # side of the face, value of the map
 
 
 class Bucket(NamedTuple):
-    """What maps are summed into: "flush", a set of the textures by number, or folds by name."""
+    """Target of a sum of maps: "flush", a texture set by number, or folds by name."""
 
     kind: str  # "flush", "color", "normal" or "bump"
     number: int = 0  # of the set: of "color" and "normal"
@@ -53,7 +53,7 @@ class Mask(NamedTuple):
 
 
 class Skin:
-    """Builds one skin material; what its steps share is held here.
+    """Builds one skin material and stores the data of its steps.
 
     Args:
         graph: nodes.Graph of the material.
@@ -87,7 +87,8 @@ class Skin:
             graph.set(Coat_Weight=_OILY, Coat_Ior=_IOR)
 
     def _subsurface(self, color: Value) -> None:
-        """Less far in dark skin, and none beside an open border, where light would fall out."""
+        """Subsurface scattering: shorter in dark skin, and none beside an open border, where light
+        would leak."""
         graph, look = self.graph, self.look
         light = graph.node("RGBToBW")
         graph.put(color, light.inputs[0])
@@ -111,7 +112,7 @@ class Skin:
     # --- animated maps -------------------------------------------------------------------
 
     def _read_maps(self) -> None:
-        """Value nodes for the maps that show on this mesh, and what they are summed into."""
+        """Add value nodes for the visible maps of this mesh, and their sums."""
         frame = None
         groups = {}
         for use in self.look.uses:
@@ -131,7 +132,7 @@ class Skin:
             self._file(bucket, amounts)
 
     def _targets(self, use: animated_maps.MapUse) -> list[tuple[Bucket, Mask]]:
-        """What a map acts on here: pairs of bucket and mask; none where nobody would see it."""
+        """Targets of a map on this mesh: pairs of bucket and mask; none if it is invisible."""
         look = self.look
         own = look.image(f"map:{use.label}", data=True)
         if own is not None:
@@ -234,7 +235,7 @@ class Skin:
         return color
 
     def _tone(self) -> Value:
-        """Skin without a texture: blotches, and blood where a face has more of it."""
+        """Skin without a texture: blotches, and redder areas of a face."""
         graph, unit = self.graph, self.look.unit
         blotches = graph.noise(self.points, 1.1 / unit, detail=6.0, roughness=0.6)
         color = graph.ramp(blotches, (0.32, _DARK), (0.68, _TONE))
@@ -245,7 +246,7 @@ class Skin:
         return color
 
     def _tint(self, color: Value, number: int, amount: Value) -> Value:
-        """Towards the set's colours; sets of newer exports hold differences about 0.5."""
+        """Mix towards the colours of a set; sets of newer exports store differences around 0.5."""
         graph = self.graph
         picture = graph.image(self.look.image(f"color:{number}"), label=f"Colour {number}")
         other = picture.outputs["Color"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The files whose faces are mixed, read once; and the mesh that shows what comes of them."""
+"""The files of a mix, read once, and the mesh of its preview."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ PREVIEW = "risorius_mix_preview"  # on the object that shows the mix
 _read: dict[str, tuple[tuple[float, int], native.Dna]] = session.table(
     "parents.read", ("unregister",)
 )
-# The paths of now -> what the preview needs.
+# Current paths -> data of the preview.
 _seen: dict[tuple[str, ...], _Seen] = session.table("parents.seen", ("unregister",))
 
 Regions = Mapping[str, Mapping[int, float]]
 
 
 class MixError(FaceError, ValueError):
-    """Faces that cannot be mixed; the sentence says why."""
+    """Faces cannot be mixed; the sentence gives the reason."""
 
 
 def region_names() -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def region_names() -> tuple[str, ...]:
 
 
 def read(path: str) -> native.Dna:
-    """The Dna of a file, from memory where the file is as it was.
+    """The Dna of a file, from memory if the file has not changed.
 
     Args:
         path: of the file, absolute.
@@ -77,7 +77,7 @@ def refused(first: str, other: str) -> str:
 
 
 class _Seen:
-    """What does not change while sliders move: masks and polygons of the finest level."""
+    """Data that do not change with sliders: masks and polygons of the finest level."""
 
     def __init__(self, context: Context, paths: Sequence[str]) -> None:
         bald = native.part("mixing").without_hair
@@ -132,16 +132,16 @@ def preview(context: Context) -> MeshObject | None:
 def show(
     context: Context, paths: Sequence[str], shares: Sequence[float], regions: Regions
 ) -> MeshObject:
-    """Shows a mix; where it is shown already, its vertices move.
+    """Show a mix, or move the vertices of the existing preview.
 
     Args:
         context: Blender context.
-        paths: of the parents, which go together.
-        shares: of each.
-        regions: where they are others.
+        paths: paths of matching parents.
+        shares: share of each parent.
+        regions: regions with other shares.
 
     Raises:
-        ValueError: shares that make no sense.
+        ValueError: invalid shares.
     """
     key = tuple(paths)
     if key not in _seen:
@@ -167,7 +167,7 @@ def show(
 
 
 def hide(context: Context) -> None:
-    """Removes what shows the mix.
+    """Remove the preview of the mix.
 
     Args:
         context: Blender context.
@@ -186,23 +186,23 @@ def write(
     regions: Regions,
     progress: Callable[[float], None],
 ) -> dict[str, str]:
-    """Writes the mix as a DNA file, with its textures beside it.
+    """Write the mix as a DNA file, with its textures beside it.
 
     Args:
         path: of the new file.
-        paths: of the parents, which go together.
-        shares: of each.
-        regions: where they are others.
-        progress: told the share that is done, 0 to 1.
+        paths: paths of matching parents.
+        shares: share of each parent.
+        regions: regions with other shares.
+        progress: called with the finished share, 0 to 1.
 
     Returns:
-        Names of textures that are the leading parent's own -> why: a key of mixing.textures.WHY.
+        Textures taken unmixed from the leading parent -> reason, a key of mixing.textures.WHY.
 
     Raises:
         MixError: the file is one of the parents.
-        OSError: it cannot be written; then each file is as it was.
-        ValueError: shares that make no sense, a region that the first face does not have, a picture
-            of the user's that would be replaced.
+        OSError: it cannot be written; no file has changed.
+        ValueError: invalid shares, a region that the first face lacks, or a picture of the user
+            would be replaced.
     """
     target = Path(path)
     if any(target.resolve() == Path(p).resolve() for p in paths):

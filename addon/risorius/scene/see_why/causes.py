@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What moves a vertex, which correctives fire, which take part in a control: in millimetres."""
+"""Causes of the motion of a vertex, firing correctives, and correctives of a control, in
+millimetres."""
 
 from __future__ import annotations
 
@@ -17,24 +18,25 @@ from . import displacement, present
 Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joints and shapes, of one or of many
 _LEAST = 1e-3  # millimetres that are no movement: float32 of a head that stands 1.7 m high
 _MOST_FIRING = 24  # correctives whose reach is computed, those of the largest values
-# Deforming armature -> what was last found of it.
+# Deforming armature -> its last result.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
-# Deforming armature -> the correctives that fire, and what they were computed from.
+# Deforming armature -> firing correctives, and the inputs of that result.
 _fired: dict[int, tuple[object, list[Cause]]] = session.table("causes.fired", ("undo", "load"))
 
 
 @dataclass(frozen=True)
 class Cause:
-    """What moves something.
+    """A cause of motion.
 
     Attributes:
         control: index in raw | corrective | network | pose.
         name: in lists.
         is_raw: whether it is a raw control, which has a slider.
-        value: that it has now.
-        now: millimetres by which it moves it now.
-        full: millimetres between its rest and its full value, all others as now; 0: no raw control.
-        label: of its slider, where it has one.
+        value: current value.
+        now: its current motion in millimetres.
+        full: motion in millimetres between its rest and its full value, with all others as now; 0
+            if it is no raw control.
+        label: of its slider, if any.
     """
 
     control: int
@@ -48,12 +50,12 @@ class Cause:
 
 @dataclass(frozen=True)
 class Found:
-    """What moves a vertex.
+    """The causes of a vertex's motion.
 
     Attributes:
-        mesh, vertex: which one.
-        moved: millimetres that it is away from neutral.
-        causes: those that move it, the strongest first.
+        mesh, vertex: mesh and vertex index.
+        moved: distance from neutral in millimetres.
+        causes: causes, the strongest first.
     """
 
     mesh: int
@@ -80,12 +82,12 @@ class Part:
 
 
 def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
-    """What moves a vertex at the pose of now; kept until `last` is asked, None for a lost face.
+    """The causes of a vertex's motion in the current pose, stored for `last`; None for a lost face.
 
     Args:
         rig: deforming armature.
         mesh: index of the mesh in the file.
-        vertex: of the mesh.
+        vertex: vertex index.
     """
     now = present.of(rig)
     if now is None:
@@ -131,15 +133,15 @@ def of_vertex(rig: ArmatureObject, mesh: int, vertex: int) -> Found | None:
 
 
 def last(rig: ArmatureObject) -> Found | None:
-    """What `of_vertex` last found. Args: rig  deforming armature."""
+    """The last result of `of_vertex`. Args: rig deforming armature."""
     return _found.get(rig.session_uid)
 
 
 def firing(now: present.Present) -> list[int]:
-    """Correctives and poses that are on, by index, the largest values first.
+    """Indices of firing correctives and poses, the largest values first.
 
     Args:
-        now: of the face.
+        now: the current face.
     """
     values = np.asarray(now.live.rig.evaluate(now.raw, now.lod).controls)
     count = len(now.raw)
@@ -148,11 +150,11 @@ def firing(now: present.Present) -> list[int]:
 
 
 def _without(now: present.Present, controls: list[int]) -> dict[int, Poses]:
-    """The pose of now without what each of some controls gives it.
+    """The current pose without each of some controls.
 
     Args:
         now: of the face.
-        controls: indices in raw | corrective | network | pose, that are on.
+        controls: indices in raw | corrective | network | pose of active controls.
     """
     live = now.live
     if not controls:
@@ -184,7 +186,7 @@ def _shapes_by(now: present.Present) -> Mapping[int, list[int]]:
 
 
 def without(now: present.Present, control: int) -> Poses:
-    """The pose of now without what a corrective gives it: joints and shapes.
+    """The current pose without a corrective: joints and shapes.
 
     Args:
         now: of the face.
@@ -194,13 +196,14 @@ def without(now: present.Present, control: int) -> Poses:
 
 
 def strongest(rig: ArmatureObject, count: int = 8) -> list[Cause]:
-    """The correctives that fire now, those first that move a vertex most.
+    """The firing correctives, sorted by their largest motion of a vertex.
 
-    Of very many the largest values are looked at only. `now` is of the vertex that each moves most.
+    If very many fire, only the largest values are examined. `now` is the motion of the vertex that
+    each moves most.
 
     Args:
         rig: deforming armature.
-        count: how many are given.
+        count: largest number of results.
     """
     now = present.of(rig)
     if now is None:
@@ -221,7 +224,7 @@ def is_known(rig: ArmatureObject) -> bool:
 
 
 def known(rig: ArmatureObject) -> list[Cause]:
-    """What `strongest` last found, maybe of a pose of before. Args: rig  deforming armature."""
+    """The last result of `strongest`, maybe of an earlier pose. Args: rig deforming armature."""
     return list(_fired.get(rig.session_uid, (None, []))[1])
 
 
@@ -244,7 +247,7 @@ def _strongest(rig: ArmatureObject, now: present.Present) -> list[Cause]:
 
 
 def parts_of(rig: ArmatureObject, control: int) -> list[Part]:
-    """The correctives that a control takes part in, those that are on first.
+    """The correctives with a control as a factor, firing ones first.
 
     Args:
         rig: deforming armature.
@@ -299,7 +302,7 @@ def control_of(rig: ArmatureObject, label: str) -> int:
 
 
 def nearest(rig: ArmatureObject, item: int, place: NDArray[np.float64]) -> int:
-    """The vertex of a mesh that lies nearest to a place, as the face shows now; -1: there is none.
+    """The vertex of a mesh nearest to a place in the current pose; -1: none.
 
     Args:
         rig: deforming armature.

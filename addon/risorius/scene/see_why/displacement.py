@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far poses move the vertices of a face, from its DNA alone.
+"""Motion of the vertices of a face in poses, from its DNA alone.
 
-Shapes and weights are the file's own: what the user has sculpted or painted over it is not seen.
+Shapes and weights are the file's own: the user's sculpts and painted weights are not included.
 """
 
 from __future__ import annotations
@@ -126,11 +126,11 @@ def at_vertex(
     joints: NDArray[np.float32],
     shapes: NDArray[np.float32],
 ) -> Doubles:
-    """Where one vertex lies at many poses, float64[N, 3] in Blender units.
+    """Places of one vertex in many poses, float64[N, 3] in Blender units.
 
     Args:
         live: Runtime of the character.
-        mesh, vertex: which one.
+        mesh, vertex: mesh and vertex index.
         joints: float32[N, J, 9] deltas.
         shapes: float32[N, B] weights of the channels.
     """

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heat maps: how far something moves each vertex, as a colour attribute of the face's meshes.
+"""Heat maps: motion of each vertex as a colour attribute of the face's meshes.
 
-Materials stay as they are: the solid view shows the attribute. What of it is there is a property of
-the deforming armature, so that undo finds it; a file never has any of it.
+Materials stay as they are: the solid view shows the attribute. A property of the deforming armature
+    stores the state, so that undo restores it. Files never contain it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from . import causes, displacement, heat_views, layer_share, present
 
 KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
 _LEAST = 0.01  # millimetres at the hot end at least: noise shall not glow
-# Deforming armature -> what its colours were computed from.
+# Deforming armature -> inputs of its colours.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
 # Deforming armature -> its map while a file is saved.
 _held: dict[int, tuple[str, str]] = session.table("heat.held", ("load",))
@@ -47,8 +47,8 @@ class Heat:
     """The title of a heat map.
 
     Attributes:
-        kind: CONTROL: how far a control reaches from neutral, POSE: how far the pose of now is
-            from neutral, CORRECTIVE: what one adds now, LAYER: what one adds now.
+        kind: CONTROL: reach of a control from neutral; POSE: distance of the current pose from
+            neutral; CORRECTIVE, LAYER: current share of one.
         what: label of the control, number of the corrective or of the layer's place.
         most: millimetres at the hot end.
     """
@@ -74,10 +74,10 @@ def show(rig: ArmatureObject, kind: str, what: str, depsgraph: Depsgraph) -> Hea
     Args:
         rig: its deforming armature.
         kind, what: see Heat.
-        depsgraph: where layers are read.
+        depsgraph: graph for reading layers.
 
     Raises:
-        FaceError: there is no such control, corrective or layer, or nothing can be coloured.
+        FaceError: the control, corrective or layer does not exist, or nothing can be coloured.
     """
     now = present.of(rig)
     if now is None:
@@ -143,7 +143,7 @@ def _poses(pose: native.Pose) -> causes.Poses:
 
 
 def _state(now: present.Present, kind: str) -> object:
-    """What the colours of a kind hang on."""
+    """The inputs of the colours of a kind."""
     return (now.lod, None) if kind == "CONTROL" else (now.lod, now.raw.tobytes(), now.look)
 
 
@@ -211,7 +211,7 @@ def take_away() -> None:
 
 
 def give_back(depsgraph: Depsgraph) -> None:
-    """Show again what `take_away` took. Args: depsgraph  where layers are read."""
+    """Restore the maps that `take_away` removed. Args: depsgraph graph for reading layers."""
     for rig in parts.rigs():
         kept = _held.pop(rig.session_uid, None)
         if kept is not None:
@@ -232,7 +232,7 @@ def end_all() -> None:
 
 
 def follow_undo() -> None:
-    """After undo and redo: views show colours where there are some, and else do not."""
+    """After undo and redo: update the views to the existing heat maps."""
     if any(parts.HEAT in rig for rig in parts.rigs()):
         heat_views.show()
         watch()
@@ -241,11 +241,11 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Colour a character anew where its pose is another one. Returns whether it was.
+    """Update the colours of a character if its pose has changed. Returns: whether it did.
 
     Args:
         rig: its deforming armature, with a heat map.
-        depsgraph: where layers are read.
+        depsgraph: graph for reading layers.
     """
     heat, now = of(rig), present.of(rig)
     if heat is None or now is None or _shown.get(rig.session_uid) == _state(now, heat.kind):
@@ -283,12 +283,12 @@ def _look() -> float | None:
 
 
 def title(rig: ArmatureObject, heat: Heat, called: Callable[[str], str] = str) -> str:
-    """What a heat map shows, in a sentence.
+    """The title of a heat map, as a sentence.
 
     Args:
         rig: deforming armature of the face.
         heat: its heat map.
-        called: gives the words for the name of a control or corrective.
+        called: returns the label of a control or corrective.
     """
     if heat.kind == "POSE":
         return told("Moved from Neutral")

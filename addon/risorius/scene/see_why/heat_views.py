@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""3D views that show colours while there is a heat map, and what they showed before."""
+"""3D views that show colours during a heat map, and their earlier settings."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def show() -> None:
 
 
 def give_back() -> None:
-    """Let all 3D views show what they showed before; what the user changed meanwhile stays."""
+    """Restore the settings of all 3D views; the user's changes since then stay."""
     for view in _views():
         before = _before.pop(view.as_pointer(), None)
         shading: Any = view.shading

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a layer adds: the controls with it and without it."""
+"""The share of a layer: the controls with it and without it."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ Controls = NDArray[np.float32]
 def raw_pair(
     rig: ArmatureObject, live: runtime.Runtime, place: int, depsgraph: Depsgraph
 ) -> tuple[Controls, Controls]:
-    """The raw controls of now, with a layer and without it: float32[R] each.
+    """The current raw controls with a layer and without it: float32[R] each.
 
-    How it turns head and neck is not in it: that is no control.
+    Rotations of head and neck are not included.
 
     Args:
         rig: deforming armature.
         live: Runtime of the character.
         place: of the layer among the settings.
-        depsgraph: where the controls are read.
+        depsgraph: graph for reading the controls.
 
     Raises:
-        FaceError: there is no such layer, or it cannot be played.
+        FaceError: the layer does not exist, or cannot be played.
     """
     controls = parts.controls_there(rig)
     maximum = parts.maximum_of(controls)
@@ -45,7 +45,7 @@ def raw_pair(
         raise FaceError(told("This layer plays nothing now."))
     at = stack.places.index(place)
     layer = stack.layers[at]
-    # One that was solo and is muted would let others through: one that moves nothing does not.
+    # Muting a solo layer would let others through, so use a layer that moves nothing.
     nothing = np.zeros(len(live.labels) + len(clip_units.BONES), np.float32)
     stack.layers[at] = replace(layer, mask=nothing)
     stack.weights = ()  # so that the mixer takes its layers anew

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a face shows now, and what its controls are called."""
+"""The current pose of a face, and names of its controls."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ _known: dict[int, tuple[runtime.Runtime, native.ControlNames, Factors]] = sessio
 
 @dataclass(frozen=True)
 class Present:
-    """A face at the pose that it has.
+    """A face in its current pose.
 
     Attributes:
         live: Runtime of the character.
-        raw: float32[R] raw controls, with bones and layers, whatever is left out of the look.
-        lod: the level that is shown.
-        look: what of it is shown.
+        raw: float32[R] raw controls, with bones and layers, without solo and mute.
+        lod: the shown level.
+        look: its Look.
     """
 
     live: runtime.Runtime
@@ -44,14 +44,14 @@ class Present:
         return np.array(self.live.rests, np.float32)
 
     def pose(self) -> native.Pose:
-        """What is shown."""
+        """The shown pose."""
         pose = self.live.rig.evaluate(look_masks.raw_of(self.look, self.raw, self.live), self.lod)
         look_masks.apply(self.look, pose, self.live, self.lod)
         return pose
 
 
 def of(rig: ArmatureObject) -> Present | None:
-    """What a character shows now; None where its data or its controls are lost, or it is baked.
+    """The current pose of a character; None if its data or controls are lost, or it is baked.
 
     Args:
         rig: its deforming armature.
@@ -91,7 +91,8 @@ def _inputs_of_poses(dna: native.Dna, first: int) -> Factors:
     poses = dna.rbf_behavior_ext.poses
     for solver in dna.rbf_behavior.solvers:
         for pose in solver.pose_indices.tolist():
-            # Files of version 2.4 have an output control for each pose, and no list of them.
+            # Files of version 2.4 have an output control for each pose and no list of output
+            # controls.
             outputs, more = [first + pose], list[int]()
             if pose < len(poses):
                 outputs = poses[pose].output_control_indices.tolist()
@@ -112,7 +113,7 @@ def factors_of(live: runtime.Runtime) -> Factors:
 
 
 def name_of(live: runtime.Runtime, control: int) -> str:
-    """What a control is called in lists: its last part; a corrective by its shape or its factors.
+    """The name of a control in lists: its last part; for a corrective its shape or its factors.
 
     Args:
         live: Runtime of the character.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the shape keys of a head are: by their names, by what the user says; their pictures."""
+"""Assignments of the shape keys of a head, by names or by the user, and their pictures."""

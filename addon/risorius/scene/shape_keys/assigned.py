@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What each shape key of a head becomes: by its name, or by what the user said.
+"""Assignments of shape keys of a head, by names or by the user.
 
-What the user said lies on the mesh as the text of the file that `risorius author --names` takes, so
-that saving and loading are copies of it.
+The mesh stores the user's assignments as text in the format of `risorius author --names`, so saving
+and loading copy this text.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ _UNITS, _CONTROLS = "arkit", "metahuman"  # vocabularies
 
 
 class Row(NamedTuple):
-    """What a shape key becomes.
+    """The assignment of a shape key.
 
     Attributes:
         key: its name.
-        kind: CONTROL: standard ones; EXPRESSION; OWN: a control of its own; NOTHING: the user left
-            it out; MUTED: it is muted, which leaves it out as well.
+        kind: CONTROL: standard ones; EXPRESSION; OWN: a control of its own; NOTHING: left out by
+            the user; MUTED: left out because it is muted.
         controls: raw controls without prefix.
         expression: name of the expression, or "".
-        by: title of the vocabulary that knew the name, or WORDS; "" where nothing did.
-        is_known: whether its name is known, whatever the user said.
-        is_said: whether the user said what it is.
-        holder: another key that is already what its name or the user says; "" where none is.
+        by: title of the vocabulary that knows the name, or WORDS; "" for none.
+        is_known: whether its name is known, regardless of the user's assignment.
+        is_said: whether the user assigned it.
+        holder: another key with the same assignment; "" for none.
     """
 
     key: str
@@ -56,15 +56,15 @@ class Names(NamedTuple):
 
     @property
     def unknown(self) -> int:
-        """How many names nothing knows and nobody has said anything of."""
+        """The number of unknown names without the user's assignment."""
         return sum(not row.is_known and not row.is_said for row in self.rows.values())
 
 
 def of(item: MeshObject) -> Names:
-    """What the shape keys of a head become.
+    """The assignments of the shape keys of a head.
 
     Args:
-        item: has shape keys.
+        item: mesh with shape keys.
     """
     keys = parts.keys_there(item)
     names = tuple(key.name for key in keys.key_blocks if key != keys.reference_key)
@@ -73,19 +73,19 @@ def of(item: MeshObject) -> Names:
 
 
 def said_of(item: MeshObject) -> dict[str, Said]:
-    """What the user said of the keys of a mesh, by their names. Args: item  any mesh."""
+    """The user's assignments of keys of a mesh, by key names. Args: item any mesh."""
     return dict(_parsed(saved.text(item.data, parts.NAMES)))
 
 
 def put(item: MeshObject, said: Mapping[str, Said | None]) -> None:
-    """Keep what the user says of keys.
+    """Store the user's assignments of keys.
 
     Args:
         item: the head.
-        said: by the names of keys; None: its name decides again. Other keys stay as they are.
+        said: by the names of keys; None: the name decides again. Other keys stay.
 
     Raises:
-        GivenError: no ARKit unit, or no name for an expression; then nothing is kept.
+        GivenError: an unknown ARKit unit, or an invalid name of an expression; nothing is stored.
     """
     module, table = native.part("author.input.said"), said_of(item)
     for key, value in said.items():
@@ -100,10 +100,10 @@ def put(item: MeshObject, said: Mapping[str, Said | None]) -> None:
 
 
 def own_control(key: str) -> str:
-    """The control that a key is where it is one of its own.
+    """The name of a key's own control.
 
     Args:
-        key: its name, which may hold letters that no control has.
+        key: name of the key; it may contain letters that are invalid in controls.
     """
     found: str = native.part("author.input.matching").own_control(key)
     return found
@@ -111,7 +111,7 @@ def own_control(key: str) -> str:
 
 @session.cached(("unregister",), 64)
 def _parsed(text: str) -> Mapping[str, Said]:
-    """The table of a text; nothing of one that somebody else wrote."""
+    """The table of a text; empty if the text is invalid."""
     if not text:
         return {}
     try:
@@ -169,12 +169,12 @@ def standard_controls() -> frozenset[str]:
 
 
 class Choice(NamedTuple):
-    """Something that a key can be.
+    """A possible assignment of a key.
 
     Attributes:
-        value: as the table says it.
+        value: its text in the table.
         label: for people, in English.
-        does: a sentence on what it does, in English, or "".
+        does: a sentence about its effect in English, or "".
         kind: CONTROL, EXPRESSION, or UNIT of an ARKit unit.
     """
 
@@ -220,7 +220,7 @@ def unit_of(controls: tuple[str, ...]) -> str:
 
 @session.cached(("unregister",), 1024)
 def weights_of(value: str) -> Mapping[str, float]:
-    """Raw controls of a standard face, with prefix, for what a key can be: for its picture.
+    """Raw controls of a standard face, with prefix, for the picture of a possible assignment.
 
     Args:
         value: of a Choice.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of shape keys on their head, and of what they may be on the sample man.
+"""Pictures of shape keys on their head, and of possible assignments on the sample man.
 
-Both are drawn in a thread without a window (scene/expressions/portrait.py) and kept in files by the
-hash of what they show. What a key moves has the colour of a heat map.
+A thread draws both without a window (scene/expressions/portrait.py), and files cache them by the
+hash of their content. The moving part has the colour of a heat map.
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ _SAMPLE = "man"
 
 @dataclass(frozen=True)
 class Model:
-    """A head as its pictures need it; holds nothing of Blender's.
+    """The data of a head for its pictures, without Blender data.
 
     Attributes:
         points: float64[V, 3], the face looks along -y.
-        ways: float32[V, 3] by the names of keys.
+        ways: float32[V, 3] displacement by key names.
         triangles: int64[F, 3].
-        frame: the middle of the pictures, and half their height.
-        paths: the files of the pictures by the names of keys.
+        frame: centre of the pictures, and half their height.
+        paths: files of the pictures by key names.
     """
 
     points: Floats
@@ -60,12 +60,12 @@ class Model:
 
 
 class Job(NamedTuple):
-    """Pictures to be made.
+    """Pictures to draw.
 
     Attributes:
         model: the head.
         keys: names of keys.
-        samples: what keys may be, as assigned.Choice says it.
+        samples: values of assigned.Choice.
     """
 
     model: Model
@@ -73,15 +73,15 @@ class Job(NamedTuple):
     samples: Sequence[str]
 
 
-# The pictures of the heads of this file: by the session_uid of the mesh, by the names of its keys.
+# Pictures of the heads of this file: session_uid of the mesh -> key name -> path.
 _paths: dict[int, Mapping[str, Path]] = session.table("shape_keys.paths", ("undo", "load"))
 
 
 def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
-    """Where the pictures of a head's keys lie or will; None where nobody has looked yet.
+    """The paths of the pictures of a head's keys, existing or not; None before the first search.
 
-    A panel asks this: it hashes nothing, so keys that were edited since keep their old pictures
-    until they are drawn anew.
+    Panels call this often, so it computes no hashes: edited keys keep their old pictures until
+        these are drawn again.
 
     Args:
         item: the head.
@@ -90,7 +90,7 @@ def paths_of(item: MeshObject) -> Mapping[str, Path] | None:
 
 
 def model_of(item: MeshObject) -> Model:
-    """What the pictures of a head are drawn from. Args: item  has shape keys."""
+    """The data for the pictures of a head. Args: item mesh with shape keys."""
     keys, mesh = parts.keys_there(item), item.data
     turn = np.array(item.matrix_world.to_3x3(), np.float64)
 
@@ -131,8 +131,8 @@ def _digest(*parts_of_it: bytes) -> str:
 
 
 def _shares(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
-    """float64[V]: how far each vertex goes at most, as a share of what goes furthest by that key:
-    a brow counts as much as a jaw. Keys that move next to nothing do not count."""
+    """float64[V]: largest motion of each vertex, relative to the largest motion of the same key, so
+    that a brow counts as much as a jaw. Keys with almost no motion do not count."""
     lengths = [np.nan_to_num(np.linalg.norm(way, axis=1), posinf=0.0) for way in ways.values()]
     furthest = [float(length.max(initial=0.0)) for length in lengths]
     share = np.zeros(count)
@@ -143,9 +143,9 @@ def _shares(ways: Mapping[str, NDArray[np.float32]], count: int) -> Floats:
 
 
 def _to_front(rest: Floats, far: Floats) -> Floats:
-    """Turns by quarters about z until what moves looks along -y.
+    """A rotation by quarters about z that turns the moving part towards -y.
 
-    A face moves at its front, whichever way the head was put.
+    A face moves at its front, so this works for every orientation of the head.
     """
     middle = (rest.min(axis=0) + rest.max(axis=0)) / 2
     way = (far[:, None] * (rest - middle)).sum(axis=0)[:2]
@@ -169,14 +169,14 @@ def _frame(rest: Floats, far: Floats) -> tuple[Floats, float]:
 
 
 def draw(model: Model, key: str) -> Floats:
-    """A head with one key, what it moves coloured.
+    """Draw a head with one key and its motion in colour.
 
     Args:
         model: the head.
         key: name of the key.
 
     Returns:
-        As portrait.draw.
+        See portrait.draw.
     """
     way = model.ways[key].astype(np.float64)
     length = np.linalg.norm(way, axis=1)
@@ -186,13 +186,13 @@ def draw(model: Model, key: str) -> Floats:
 
 
 def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) -> Floats:
-    """Colours of triangles, those of what moves turned to orange.
+    """Colours of triangles, with moving parts in orange.
 
     Args:
         colors: float64[F, 3].
-        length: float64[V], how far each vertex goes.
+        length: float64[V], motion of each vertex.
         triangles: int64[F, 3].
-        furthest: how far that goes which has the full colour.
+        furthest: motion with the full colour.
     """
     share = np.sqrt(length / max(furthest, 1e-12))
     share = np.where(share > _FAINT, share, 0.0)[triangles].mean(axis=1)[:, None] * _STRONG
@@ -201,17 +201,17 @@ def _marked(colors: Floats, length: Floats, triangles: Ints, furthest: float) ->
 
 
 def sample_path(value: str) -> Path:
-    """The file of the picture of what a key may be. Args: value  as assigned.Choice says it."""
+    """The picture file of a possible assignment. Args: value of an assigned.Choice."""
     shown = sorted(assigned.weights_of(value).items())  # jawOpen and =jawOpen are one picture
     text = f"sample {VERSION} {portrait.VERSION} {native.addon_version()} {shown}"
     return _file(_digest(text.encode()))
 
 
 def without_picture(values: Sequence[str]) -> list[str]:
-    """The meanings of keys that have no picture yet, each picture once.
+    """The assignments without a picture, without duplicates.
 
     Args:
-        values: as assigned.Choice says them.
+        values: values of assigned.Choice.
     """
     found = {
         path: value for value in reversed(values) if not (path := sample_path(value)).is_file()
@@ -229,7 +229,7 @@ def sample_sitter() -> portrait.Sitter | None:
 
 
 def _draw_sample(sitter: portrait.Sitter, rest: Sequence[Floats], value: str) -> Floats:
-    """The sample man as what a key may be. Args: rest  portrait.places of no sliders."""
+    """Draw the sample man with an assignment. Args: rest portrait.places of the neutral face."""
     placed = portrait.places(sitter, assigned.weights_of(value))
     lengths = [np.linalg.norm(a - b, axis=1) for a, b in zip(placed, rest, strict=True)]
     furthest = max(float(length.max(initial=0.0)) for length in lengths)
@@ -245,15 +245,15 @@ def make(
     progress: Callable[[float], None] = lambda _share: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Draw pictures that are not there yet and write their files; touches nothing of Blender's.
+    """Draw missing pictures and write their files, without using Blender data.
 
     Args:
-        job: which.
-        progress: takes the share that is done, 0 to 1.
-        cancelled: asks whether to end.
+        job: pictures to draw.
+        progress: called with the finished share, 0 to 1.
+        cancelled: returns whether to stop.
 
     Returns:
-        How many were made.
+        The number of pictures.
 
     Raises:
         OSError: a file cannot be written.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Curves of the last imported file that no mapping knew, and what the user says that they are.
+"""Unknown curves of the last import, and the user's assignments.
 
-They lie on the control armature as JSON; what is said becomes a mapping of the user's own.
+The control armature stores them as JSON. The assignments become a mapping of the user.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from . import assigned
 
 @dataclass(frozen=True)
 class Unknown:
-    """Curves without a meaning.
+    """Unknown curves of an import.
 
     Attributes:
-        mapping: that the file was read by: a name, the path of a file, or "" where none knew it.
-        settings: what the import was asked for, by the names of the operator's properties.
+        mapping: mapping of the import: a name, the path of a file, or "" for none.
+        settings: settings of the import by the operator's property names.
         names: of the curves.
-        said: what the user says that they are, as assigned.Choice has it; "" where one is left out.
+        said: assignments as values of assigned.Choice; "" for curves to leave out.
     """
 
     mapping: str
@@ -40,7 +40,7 @@ def of(controls: ArmatureObject) -> Unknown | None:
 
 @session.cached(("unregister",), 16)
 def _parsed(text: str) -> Unknown | None:
-    """What a text says; None of one that somebody else wrote."""
+    """Parse a stored text; None if it is invalid."""
     try:
         found = Unknown(**json.loads(text))
         said = {str(name): str(value) for name, value in found.said.items()}
@@ -51,11 +51,11 @@ def _parsed(text: str) -> Unknown | None:
 
 
 def keep(controls: ArmatureObject, found: Unknown) -> None:
-    """Remember unknown curves; what was said of curves of these names before still counts.
+    """Store unknown curves; earlier assignments of the same names stay.
 
     Args:
         controls: the control armature.
-        found: of no names: there are none, and those of before are forgotten.
+        found: the curves; without names the stored ones are removed.
     """
     before = of(controls)
     if not found.names:
@@ -73,7 +73,7 @@ def put(controls: ArmatureObject, name: str, value: str | None) -> None:
     Args:
         controls: the control armature.
         name: of the curve.
-        value: of an assigned.Choice; "": it is left out; None: nothing is said.
+        value: of an assigned.Choice; "": leave it out; None: no assignment.
     """
     found = of(controls)
     if found is None or name not in found.names:
@@ -85,13 +85,13 @@ def put(controls: ArmatureObject, name: str, value: str | None) -> None:
 
 
 def mapping_text(found: Unknown) -> str:
-    """The mapping that the file was read by, with what the user said.
+    """The mapping of the import with the user's assignments.
 
     Args:
-        found: of a face.
+        found: unknown curves of a face.
 
     Raises:
-        MappingError: the mapping of before cannot be read.
+        MappingError: the earlier mapping cannot be read.
     """
     rows = {name: _row(value) for name, value in found.said.items()}
     text: str = native.part("importing").mapping_with(found.mapping, rows)

@@ -19,15 +19,15 @@ from ..character import runtime
 
 @dataclass
 class Writer:
-    """What writing to the bones of one armature needs, until its bones change.
+    """Data for writing the bones of one armature, valid until its bones change.
 
     Attributes:
         count: of its bones.
-        where: int64[n] the positions of those that the evaluator owns.
+        where: int64[n] positions of bones that the evaluator owns.
         space: risorius.BoneSpace of these, in the same order.
         turning: (name of the control bone, row in these, share of the turn, rest rotation).
-        buffers: channel -> float32 for all bones; None where the evaluator owns every bone.
-        driving: joint -> position of its bone, of the joints whose rotation raw controls hold.
+        buffers: channel -> float32 for all bones; None if the evaluator owns every bone.
+        driving: joint -> position of its bone, of joints whose rotation is stored in raw controls.
     """
 
     count: int
@@ -49,19 +49,18 @@ def write(
     depsgraph: Depsgraph | None,
     keyed: Collection[int] = (),
 ) -> bool:
-    """Write the joints that the evaluator owns; all others keep what the user gave them.
+    """Write the joints that the evaluator owns; other bones keep the user's values.
 
     Args:
         rig: the deforming armature, the original.
         live: its Runtime.
         deltas: float32[J, 9] of a Pose.
         turns: "neck" and "head" -> Quaternion in the armature's axes, added on top.
-        depsgraph: where the animated values of all other bones are read; None where they have
-            none.
-        keyed: positions of bones of neck and head that keep what the user gave them, too.
+        depsgraph: graph for reading animated values of other bones; None if they have none.
+        keyed: positions of bones of neck and head that also keep the user's values.
 
     Returns:
-        Whether Blender took them: it refuses bulk writes to overrides without a word.
+        Whether Blender accepted the values; it silently refuses bulk writes to overrides.
     """
     bones = rig.pose.bones
     writer = writer_of(rig, live)
@@ -95,7 +94,7 @@ def pose_of(
 
     Args:
         writer: see writer_of.
-        deltas, turns: as for `write`.
+        deltas, turns: see `write`.
 
     Returns:
         "location", "rotation_quaternion", "scale" -> float32[n, width].
@@ -115,12 +114,12 @@ def _taken(rig: ArmatureObject, written: Mapping[str, NDArray[np.float32]]) -> b
 
 
 def is_there(values: bpy.types.bpy_prop_collection, name: str, wanted: NDArray[np.float32]) -> bool:
-    """Whether a bulk read gives what was written.
+    """Whether a bulk read returns the written values.
 
     Args:
         values: a collection of properties.
-        name: of the member that is read from each.
-        wanted: float32, flat, what it should be.
+        name: name of the member to read.
+        wanted: float32, flat, expected values.
     """
     got = np.empty_like(wanted)
     values.foreach_get(name, got)

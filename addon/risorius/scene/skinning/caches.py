@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The caches of simulations, and those that were baked while faces were one frame late.
+"""Caches of simulations, and caches baked when faces were one frame late.
 
-Nothing in a cache says how it was made; the form of a scene's characters does: before form 2 every
-simulation saw the face of the frame before. So a character of an older file keeps its form as long
-as a cache that was baked then is there, and is asked again when the file is opened.
+A cache does not store how it was made, but the form of the characters in a scene does: before form
+    2 every simulation saw the face of the frame before. So a character of an older file keeps its
+    form while such a cache exists, and is checked again when the file is opened.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _of_modifier(modifier: bpy.types.Modifier) -> Iterator[bpy.types.PointCache]
 
 
 def _baked(scene: bpy.types.Scene) -> set[Key]:
-    """Those of a scene's caches that are baked, and its fluids that are."""
+    """The baked caches and fluids of a scene."""
     found = {key for key, cache in of_scene(scene) if cache.is_baked}
     for item in scene.objects:
         for modifier in item.modifiers:
@@ -59,7 +59,7 @@ def _baked(scene: bpy.types.Scene) -> set[Key]:
 
 
 def any_simulates() -> bool:
-    """Whether anything in this file keeps what it saw of frames before, instances included."""
+    """Whether this file has a simulation with a cache, including instances."""
     if any(scene.rigidbody_world is not None for scene in bpy.data.scenes):
         return True
     for item in bpy.data.objects:
@@ -76,19 +76,20 @@ def _bakes(modifier: bpy.types.Modifier) -> bool:
 
 
 def have_nodes(rig: ArmatureObject) -> bool:
-    """Whether geometry nodes in a face's scenes can be baked: they do not say whether they are."""
+    """Whether scenes of a face have geometry nodes that can be baked; they do not tell whether they
+    are."""
     items = (item for scene in rig.users_scene for item in scene.objects)
     return any(_bakes(m) for item in items for m in item.modifiers)
 
 
 def note_old(rig: ArmatureObject) -> bool:
-    """Note what is baked in the scenes of a character of an older file.
+    """Note baked caches in the scenes of a character of an older file.
 
     Args:
         rig: its deforming armature.
 
     Returns:
-        Whether any of it is there still.
+        Whether any of them still exists.
     """
     if rig.session_uid not in _late:
         _late[rig.session_uid] = {key for scene in rig.users_scene for key in _baked(scene)}
@@ -97,7 +98,7 @@ def note_old(rig: ArmatureObject) -> bool:
 
 
 def look() -> None:
-    """Caches that are freed now are as good as new. Costs nothing where none is late."""
+    """Forget noted caches that were freed. Costs nothing if none is late."""
     if any(_late.values()):
         there = {key for scene in bpy.data.scenes for key in _baked(scene)}
         for keys in _late.values():
@@ -105,7 +106,7 @@ def look() -> None:
 
 
 def words(rig: ArmatureObject) -> str:
-    """What the panel says where caches around a face are late; else empty."""
+    """The sentence of the panel about late caches around a face; else empty."""
     count = len(_late.get(rig.session_uid, ()))
     if not count:
         return ""

@@ -45,12 +45,12 @@ ORDINARY = Plan()  # as in a file: every mesh is deformed by its armature modifi
 
 @dataclass
 class _Kept:
-    """How a face was when it was looked at.
+    """State of a face at the last check.
 
     Attributes:
         plan: Plan.
         signature: see _signature.
-        is_fresh: whether nothing was edited since.
+        is_fresh: whether the file is unedited since.
     """
 
     plan: Plan
@@ -60,22 +60,22 @@ class _Kept:
 
 # Deforming armature -> its plan.
 _kept: dict[int, _Kept] = session.table("conditions.plans", ("rewrite", "undo", "load"))
-# Mesh object -> number of the last write to it by us: an update that tells of it is no edit.
+# Mesh object -> number of our last write to it: an update about this write is no edit.
 _written: dict[int, int] = session.table("conditions.written", ("undo", "load"))
 _writes = session.value("conditions.writes", 0, ("quit",))
-# Scene and view layer -> the last write that an update of its graph told of.
+# Scene and view layer -> the last write that an update of its graph reported.
 _told: dict[tuple[int, str], int] = session.table("conditions.told", ("undo", "load"))
 _restored = session.value("conditions.restored", False, ("load",))
 # Datablock that is no object -> number of its drivers when it was last updated.
 _drivers: dict[int, int] = session.table("conditions.drivers", ("undo", "load"))
-# Objects of the user's -> what they point to, see _pointed.
+# The user's objects -> their references, see _pointed.
 _pointing: dict[int, tuple[object, ...]] = session.table("conditions.pointing", ("undo", "load"))
-# Deforming armatures whose faces are kept as in a file that is saved or exported, by how many.
+# Deforming armature -> number of holders that keep its face in the form of files.
 _ordinary: dict[int, int] = session.table("conditions.ordinary", ("load",))
 
 
 def of(rig: ArmatureObject, live: runtime.Runtime) -> Plan:
-    """The plan of a face as last looked at; looked at now where it was edited since.
+    """The plan of a face, updated if it was edited since the last check.
 
     Args:
         rig: deforming armature, the original.
@@ -96,7 +96,7 @@ def known(rig: ArmatureObject) -> Plan | None:
 
 
 def note_moved(rig: ArmatureObject) -> None:
-    """Joints are moved by something else than us: no edit tells of keys that a script gives them.
+    """Note that something else moves joints; keys from a script cause no edit.
 
     Args:
         rig: deforming armature.
@@ -107,11 +107,11 @@ def note_moved(rig: ArmatureObject) -> None:
 
 
 def hold_ordinary(rig: ArmatureObject, on: bool) -> None:
-    """Keep a face as files have it: bones posed, modifiers enabled; calls may be nested.
+    """Keep a face in the form of files: bones posed, modifiers enabled. Calls may be nested.
 
     Args:
         rig: deforming armature.
-        on: begin, or end what was begun.
+        on: True: begin; False: end.
     """
     count = _ordinary.get(rig.session_uid, 0) + (1 if on else -1)
     if count > 0:
@@ -127,15 +127,16 @@ def note_written(item: MeshObject) -> None:
 
 
 def forget_written() -> None:
-    """No update will tell of what was written: of a frame Blender evaluates it without a word."""
+    """Forget our writes of a frame: Blender evaluates them without an update."""
     _written.clear()
 
 
 def end_updates(depsgraph: Depsgraph) -> None:
-    """The handlers of an update end: what they wrote, Blender evaluates without a word.
+    """Called at the end of the handlers of an update: Blender evaluates their writes without
+    another update.
 
     Args:
-        depsgraph: whose update it is; those of other view layers tell of it later.
+        depsgraph: graph of the update; graphs of other view layers report it later.
     """
     _told[_key_of(depsgraph)] = _writes.now
 
@@ -147,13 +148,13 @@ def _key_of(depsgraph: Depsgraph) -> tuple[int, str]:
 
 @dataclass
 class _Edits:
-    """What an edit concerns.
+    """The datablocks of an edit.
 
     Attributes:
-        told: the last write that the graph has told of before.
-        meshes: session uids of meshes of characters that somebody else edited.
+        told: the last write that the graph reported before.
+        meshes: session uids of meshes of characters edited by others.
         rigs: session uids of edited deforming armatures, and of their data.
-        foreign: whether an object was edited that belongs to no character.
+        foreign: whether an object outside all characters was edited.
     """
 
     told: int
@@ -201,7 +202,7 @@ def _may_read_anew(item: bpy.types.Object) -> bool:
 
 
 def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
-    """What an object points to by parent, constraints, modifiers and drivers."""
+    """References of an object: parent, constraints, modifiers and drivers."""
     bones = item.pose.bones if item.pose is not None else ()
     holds = [*item.constraints, *(hold for bone in bones for hold in bone.constraints)]
     targets = [
@@ -216,7 +217,7 @@ def _pointed(item: bpy.types.Object) -> tuple[object, ...]:
 
 
 def _uid(thing: object) -> int:
-    """The session uid of a datablock, 0 of anything else: no Blender object is kept."""
+    """The session uid of a datablock, or 0. Uids are kept instead of Blender objects."""
     return thing.session_uid if isinstance(thing, bpy.types.ID) else 0
 
 
@@ -230,13 +231,13 @@ def _has_other_drivers(item: bpy.types.ID) -> bool:
 
 
 def note_updates(depsgraph: Depsgraph) -> set[int]:
-    """Look which plans an edit may have changed.
+    """Find the plans that an edit may have changed.
 
     Args:
         depsgraph: with the updates of the edit.
 
     Returns:
-        Session uids of meshes that somebody else than this add-on edited.
+        Session uids of meshes edited by anyone but this add-on.
     """
     edits = _Edits(_told.get(_key_of(depsgraph), 0))
     for update in depsgraph.updates:
@@ -260,12 +261,13 @@ def note_updates(depsgraph: Depsgraph) -> set[int]:
 
 
 def note_restored() -> None:
-    """Undo and redo are told as an update of all that they made anew, which is no edit."""
+    """Note undo or redo: the following update of all restored datablocks is no edit."""
     _restored.now = True
 
 
 def look_quickly() -> None:
-    """Compare what is quickly compared of each face: modes, selection, modifiers and keys."""
+    """Compare the settings of each face that are quick to compare: modes, selection, modifiers and
+    keys."""
     for rig in parts.rigs():
         kept = _kept.get(rig.session_uid)
         if kept is not None and kept.is_fresh and kept.signature != _signature(rig):
@@ -277,9 +279,10 @@ _TAGGED = ("OBJECT", "MESH", "KEY", "ARMATURE", "COLLECTION", "SCENE")
 
 
 def look_at_tagged(scene: bpy.types.Scene) -> None:
-    """Before a frame: look at what a script has edited since the last update of a scene.
+    """Before a frame: check edits of a script since the last update of a scene.
 
-    Without an interface Blender tells of it only with the frame, among all that is animated.
+    Without an interface Blender reports them only with the frame, together with all animated
+    datablocks.
 
     Args:
         scene: the original.
@@ -296,7 +299,7 @@ def look_at_tagged(scene: bpy.types.Scene) -> None:
 
 
 def stale(rig: ArmatureObject) -> bool:
-    """Whether a face has a plan that no longer holds. Args: rig  deforming armature."""
+    """Whether the plan of a face is outdated. Args: rig deforming armature."""
     kept = _kept.get(rig.session_uid)
     return kept is not None and not kept.is_fresh
 
@@ -383,7 +386,8 @@ _BONE_FLAGS = {
 
 
 def _changed_bone(rig: ArmatureObject, live: runtime.Runtime) -> str:
-    """The name of a bone that Blender poses otherwise than the evaluator thinks, else empty."""
+    """The name of a bone whose settings make Blender pose it differently from the evaluator, else
+    empty."""
     bones = rig.data.bones
     count = len(bones)
     wrong = np.zeros(count, bool)
@@ -432,7 +436,7 @@ def _mesh(item: MeshObject, rig: ArmatureObject, live: runtime.Runtime) -> Itera
 
 
 def _standing(item: MeshObject, rig: ArmatureObject) -> Iterator[Sentence]:
-    """Whether a mesh stands where its rig stands."""
+    """A sentence if a mesh was moved against its rig."""
     place = np.array(item.matrix_parent_inverse @ item.matrix_basis)
     moved = np.abs(place - np.eye(4)).max() > _STRAIGHT
     moved = moved or item.parent != rig or item.parent_type != "OBJECT" or len(item.constraints)
@@ -456,8 +460,8 @@ def armature_of(item: MeshObject, rig: ArmatureObject) -> bpy.types.ArmatureModi
         rig: the deforming armature.
 
     Returns:
-        In Direct mode the one that was disabled by us, whatever it points to now; else the first
-        of this rig.
+        In Direct mode the modifier that we disabled, even if it now points elsewhere; otherwise the
+        first one of this rig.
     """
     marked = saved.whole(item, parts.FINISHED, 0)
     own = None
@@ -542,7 +546,7 @@ def _readers(rig: ArmatureObject) -> Iterator[Sentence]:
 
 
 def _reads_bones(item: bpy.types.Object, rig: ArmatureObject) -> bool:
-    """Whether an object of the character itself reads bones beside what it was built with."""
+    """Whether an object of the character reads bones by anything but its original modifier."""
     count = 0
     for modifier in item.modifiers:
         properties = modifier.bl_rna.properties

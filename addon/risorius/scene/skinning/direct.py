@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Finished positions of a face in the live keys of its meshes, with no bone posed.
+"""Direct mode: final positions in the live keys of the meshes, without posed bones.
 
-A mesh in Direct mode bears the property FINISHED, which undo, duplicates and files that Blender
-saves by itself keep: its live key has final positions, and its armature modifier is disabled.
+A mesh in Direct mode has the property FINISHED, which survives undo, duplication and automatic
+saves. Its live key has final positions, and its armature modifier is disabled.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from . import bone_writer, conditions, skins
 
 @dataclass(frozen=True)
 class Shape:
-    """What a face was shown with.
+    """The inputs of a shown face.
 
     Attributes:
         joints: float32[J, 9] of a Pose.
@@ -40,13 +40,13 @@ class Shape:
 
 @dataclass(frozen=True)
 class Frame:
-    """What the meshes of a face are written with.
+    """The data for writing the meshes of a face.
 
     Attributes:
         live: the Runtime.
         shape: Shape.
         bones: of the deforming armature.
-        writer: of the bones that the evaluator owns.
+        writer: writer of the bones that the evaluator owns.
     """
 
     live: runtime.Runtime
@@ -81,7 +81,7 @@ class _Face:
 
 @dataclass(frozen=True)
 class Job:
-    """A face whose meshes are to be written. Attributes: face; frame; items  by their number."""
+    """A face to write. Attributes: face; frame; items meshes by index."""
 
     face: native.DirectFace
     frame: Frame
@@ -91,7 +91,7 @@ class Job:
 
 # Deforming armature -> the plan that its meshes were last brought to.
 _settled: dict[int, conditions.Plan] = session.table("direct.settled", ("rewrite", "undo", "load"))
-# Deforming armature -> the Frame that was last written; what is compiled of the face.
+# Deforming armature -> the last written Frame; compiled data of the face.
 _shown: dict[int, Frame] = session.table("direct.shown", ("undo", "load"))
 _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
 
@@ -102,14 +102,14 @@ def unsettle(rig: ArmatureObject) -> None:
 
 
 def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
-    """Bring the meshes of a face into the modes of a plan.
+    """Switch the meshes of a face to the modes of a plan.
 
     Args:
         rig: deforming armature.
-        plan: of the face.
+        plan: plan of the face.
 
     Returns:
-        Whether a mesh changed its mode: what was last written says nothing of it then.
+        Whether a mesh changed its mode, so that its last written values no longer apply.
     """
     if _settled.get(rig.session_uid) is plan:
         return False
@@ -133,10 +133,10 @@ def _is_taken(item: MeshObject, rig: ArmatureObject) -> bool:
 
 
 def take(item: MeshObject, rig: ArmatureObject) -> None:
-    """Bring a mesh into Direct mode; its positions are written afterwards.
+    """Switch a mesh to Direct mode; its positions are written afterwards.
 
     Args:
-        item: the mesh object, which gets a live key where it has none.
+        item: the mesh object; it gets a live key if it has none.
         rig: deforming armature.
     """
     if meshes.live_block(item) is None:
@@ -165,11 +165,11 @@ def give_back(item: MeshObject, rig: ArmatureObject) -> None:
 
 
 def rest_form(item: MeshObject, rig: ArmatureObject) -> NDArray[np.float32] | None:
-    """float32[V, 3], what the live key of a mesh has in Live mode; None without keys.
+    """float32[V, 3], the live key of a mesh in Live mode; None without keys.
 
     Args:
         item: the mesh object.
-        rig: deforming armature, as it was last shown.
+        rig: deforming armature, in its last shown pose.
     """
     key, frame = item.data.shape_keys, shown(rig)
     if key is None:
@@ -200,7 +200,7 @@ def _forget(item: MeshObject) -> None:
 
 
 def shown(rig: ArmatureObject) -> Frame | None:
-    """What a face was last shown with; None where none of its meshes is in Direct mode.
+    """The last shown Frame of a face; None if none of its meshes is in Direct mode.
 
     Args:
         rig: deforming armature.
@@ -215,14 +215,14 @@ def prepare(
     items: Sequence[MeshObject],
     anew: bool,
 ) -> Job:
-    """Compile what of a face is not compiled yet.
+    """Compile missing data of a face.
 
     Args:
         rig: deforming armature; nothing is written to it.
         live: its Runtime.
-        shape: what the face is shown with.
-        items: the mesh objects in Direct mode that are written.
-        anew: write also what seems unchanged.
+        shape: inputs of the face.
+        items: mesh objects in Direct mode to write.
+        anew: write unchanged values too.
     """
     bones, writer = skins.bones_of(rig), bone_writer.writer_of(rig, live)
     frame = _shown[rig.session_uid] = Frame(live, shape, bones, writer)
@@ -286,7 +286,7 @@ def _addresses(items: Mapping[int, MeshObject]) -> dict[int, tuple[int, int]]:
 
 
 def _turns(frame: Frame) -> NDArray[np.float32] | None:
-    """What turns the joints of neck and head, in the axes of their bones: float32[t, 4]."""
+    """Rotations of the joints of neck and head, in the axes of their bones: float32[t, 4]."""
     turns, turning = frame.shape.turns, frame.writer.turning
     if not turns or not turning:
         return None

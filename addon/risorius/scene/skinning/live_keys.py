@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sum of all channels in the live key of a mesh.
 
-A written key is an edit of its mesh, and an edited mesh forgets its simulations: cloth would stand
-still at its first step. So before a frame the key of a mesh that bears one is written without a
-word, to the key and to its copies in the graphs of all scenes; graphs that are nobody's but a
-render's or an exporter's are told afterwards.
+Writing a key is an edit of its mesh, and an edit resets simulations: cloth would stay at its first
+    step. So before a frame the key of a mesh with a simulation is written without notifying
+    Blender, in the key and its copies in the graphs of all scenes. Graphs of renders and exporters
+    are notified afterwards.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ def write(
     force: bool,
     ahead: bool = False,
 ) -> None:
-    """Write the sum of all channels to the live key of a mesh, where it has one.
+    """Write the sum of all channels to the live key of a mesh, if it has one.
 
     Args:
         item: the mesh object.
         live: the Runtime of its character.
         weights: float32[C] of the channels.
-        force: write also what seems unchanged.
-        ahead: whether Blender is about to evaluate a frame.
+        force: write unchanged values too.
+        ahead: whether this happens before a frame.
     """
     key = item.data.shape_keys
     block = meshes.live_block(item)
@@ -75,10 +75,10 @@ def bears_simulation(item: bpy.types.Object) -> bool:
 
 
 def reach(depsgraph: Depsgraph) -> None:
-    """Write the keys anew that were written without a word and did not reach a graph.
+    """Write keys again whose silent writes did not reach a graph.
 
     Args:
-        depsgraph: what Blender has evaluated.
+        depsgraph: the evaluated graph.
     """
     if not last_written.unheard:
         return

@@ -18,7 +18,7 @@ _finished: dict[int, NDArray[np.float32]] = session.table("ordinary.finished", (
 
 
 def take_on(rigs: Iterable[ArmatureObject]) -> None:
-    """Give faces the form of files, for a file that is written now. Nothing is evaluated.
+    """Give faces the form of files while a file is written. Nothing is evaluated.
 
     Args:
         rigs: deforming armatures.

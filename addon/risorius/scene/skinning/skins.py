@@ -22,8 +22,8 @@ class Bones:
     """The bones of a deforming armature.
 
     Attributes:
-        names: bone -> its place among the pose's bones.
-        joints: joint -> the place of its bone.
+        names: bone -> its position among the pose bones.
+        joints: joint -> position of its bone.
         chain: risorius.JointChain of them.
         location, rotation, scale: float32[B, 3 or 4 (w x y z)] of all bones; the evaluator writes
             the rows of its joints.
@@ -42,11 +42,11 @@ class Skin:
     """The skin of a mesh.
 
     Attributes:
-        mesh: its number in the DNA.
+        mesh: its index in the DNA file.
         skin: risorius.Skin of its vertex groups.
-        base: float32[V, 3], its reference key.
+        base: float32[V, 3], its basis key.
         mark: see _mark.
-        names: those of the Bones that it was compiled for.
+        names: names of the Bones that it was compiled for.
     """
 
     mesh: int
@@ -68,7 +68,7 @@ _edited: set[int] = session.keep("skins.edited", set, ("load",))
 def doubt() -> None:
     """Compare skins with their meshes before they are used again.
 
-    Those of meshes that nobody edited since the file was opened are what they were.
+    Meshes that were not edited since the file was opened need no comparison.
     """
     _unsure.update(_edited & _skins.keys())
 
@@ -95,11 +95,11 @@ def bones_of(rig: ArmatureObject) -> Bones:
 
 
 def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
-    """The skin of a mesh as it is now.
+    """The current skin of a mesh.
 
     Args:
         item: the mesh object.
-        bones: those of its deforming armature.
+        bones: bones of its deforming armature.
         live: the character's Runtime.
     """
     uid = item.session_uid
@@ -114,7 +114,7 @@ def of(item: MeshObject, bones: Bones, live: runtime.Runtime) -> Skin:
 
 
 def _holds(kept: Skin, item: MeshObject, bones: Bones) -> bool:
-    """Whether the skin of a mesh is still that of its vertex groups and these bones."""
+    """Whether the skin of a mesh still matches its vertex groups and bones."""
     if kept.names is not bones.names:
         if kept.names != bones.names:
             return False
@@ -209,7 +209,7 @@ def _is_as_read(skin: Skin, item: MeshObject) -> bool:
 
 
 def _mark(item: MeshObject) -> tuple[object, ...]:
-    """What differs once undo has read a mesh anew: addresses and weights of some vertices."""
+    """Values that change when undo reloads a mesh: addresses, and weights of some vertices."""
     data = item.data
     count = len(data.vertices)
     rows: list[object] = [count, tuple(group.name for group in item.vertex_groups)]

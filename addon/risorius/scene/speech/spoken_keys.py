@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The list of sounds of an action, and the mouth's keys that follow a correction of it.
 
-Of each curve only the keys between the last one before the first frame that the correction changes
-and the first one after the last such frame are made anew; all other keys stay byte for byte.
+Only keys of a curve around frames that the correction changes are replaced: from the last key
+    before the first such frame to the first key after the last one. All other keys stay byte for
+    byte.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Row(Protocol):
 
 
 class Rows(Protocol):
-    """The list of them."""
+    """The list of sounds."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, place: int) -> Row: ...
@@ -52,7 +53,7 @@ class Rows(Protocol):
 
 
 class Spoken(Protocol):
-    """What RISORIUS_PG_spoken has, which uses this module."""
+    """The members of RISORIUS_PG_spoken, which uses this module."""
 
     sounds: Rows
     active: int
@@ -79,12 +80,12 @@ class Spoken(Protocol):
 
 
 def of(action: bpy.types.Action) -> Spoken:
-    """What an action says. Args: action  any; of one without a voice the list is empty."""
+    """The voice of an action. Args: action any; without a voice the list is empty."""
     return cast(Spoken, getattr(action, PROPERTY))
 
 
 def sounds_of(action: bpy.types.Action) -> list[Sound]:
-    """The sounds of an action as they stand in its list, frames of the action."""
+    """The sounds in the list of an action, in frames of the action."""
     return [Sound(row.begin, row.name, row.word) for row in of(action).sounds]
 
 
@@ -96,15 +97,15 @@ def note(
     intensity: float,
     visemes: Mapping[str, native.Expression],
 ) -> None:
-    """Keep with an action what its voice says.
+    """Store the words and sounds of a voice with its action.
 
     Args:
-        action: made of the clip.
-        clip: of a correctable voice.
-        timing: where it lies.
-        tolerance: of the action's keys; 0 where each sample has one.
-        intensity: with which the clip was made.
-        visemes: of the face itself, with which it was made.
+        action: action of the clip.
+        clip: clip of a correctable voice.
+        timing: its place in time.
+        tolerance: tolerance of the action's keys; 0 if each sample has a key.
+        intensity: intensity of the clip.
+        visemes: visemes of the face, used for the clip.
     """
     said = of(action)
     said.start, said.fps, said.rate = float(timing.frames(np.zeros(1))[0]), timing.rate, clip.rate
@@ -171,12 +172,12 @@ def _built(action: bpy.types.Action) -> list[Sound]:
 
 
 def rebuild(action: bpy.types.Action) -> int:
-    """Make the keys anew that the list has changed since they were made.
+    """Replace the keys whose sounds have changed in the list.
 
-    Locked curves stay as they are, and curves that were deleted stay away.
+    Locked curves stay as they are, and deleted curves stay deleted.
 
     Returns:
-        How many curves have new keys.
+        The number of curves with new keys.
 
     Raises:
         SpokenError: the list is damaged, or no slider of the mouth has keys in this action.
@@ -309,7 +310,7 @@ def _replace(
     name: str,
     span: tuple[float, float],
 ) -> None:
-    """Make the keys anew from the last one before a span to the first one behind it."""
+    """Replace the keys from the last one before a span to the first one after it."""
     points = curve.keyframe_points
     at = clip_actions.key_points(curve)[0].astype(np.float64)
     before = int(np.searchsorted(at, span[0] - _BESIDE)) - 1
@@ -342,7 +343,7 @@ def _samples(
     name: str,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """What a control does between two frames; at both the curve keeps what it has there."""
+    """Values of a control between two frames; at both ends the curve keeps its values."""
     first, last = int(mouth.sample(span[0])), int(np.ceil(mouth.sample(span[1])))
     first, last = max(first - 1, 0), min(last + 2, mouth.said.samples)
     frames = mouth.frames(np.arange(first, last))
@@ -363,7 +364,7 @@ def _turn(
     left: Floats | None = None,
     right: Floats | None = None,
 ) -> None:
-    """Give a key at an end of a span the handle into it; its other handle stays where it is."""
+    """Set the handle of an end key that points into the span; its other handle stays."""
     kept = key.handle_left[:], key.handle_right[:]
     if bent:
         key.handle_left_type = key.handle_right_type = "FREE"

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sounds as markers of the scene: put up to be seen in every timeline, moved, and read again.
+"""Sounds as markers of the scene: shown in every timeline, moved, and read again.
 
 Markers of the scene, not of the action: timeline, dope sheet, graph editor and NLA all show them,
-also where the voice is a layer and not the active action. They only stand for the list that the
-action keeps; the user's own markers are never touched.
+also where the voice is a layer and not the active action. They represent the list of the action.
+The user's own markers are never changed.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from ...logic.animation.spoken import Board, Mark, Placing
 from ..base import parts, saved
 from . import spoken_keys, voices
 
-# On a scene: which markers stand for which voice, and the user's own of then, as JSON. Markers
-# themselves hold nothing beside frame and name since Blender 5.
+# Property of a scene: markers of each voice, and the user's own markers of that time, as JSON.
+# Since Blender 5 markers store frame and name only.
 _KEPT = "risorius_markers"
 
 
 def label(name: str) -> str:
-    """What animators call the mouth of a phoneme: M B P, Oo."""
+    """The animators' name of a phoneme's mouth: M B P, Oo."""
     found: str = native.part("speech.phones").label_of(name)
     return found
 
@@ -36,7 +36,7 @@ def named(text: str) -> str | None:
 
 
 def _board(scene: bpy.types.Scene) -> tuple[str, Board]:
-    """The mark of the voice whose markers a scene shows, "" where it shows none; the markers."""
+    """The mark of the voice whose markers a scene shows ("" for none), and the markers."""
     there = [Mark(m.frame, m.name) for m in scene.timeline_markers]
     try:
         kept = json.loads(saved.text(scene, _KEPT) or "{}")
@@ -69,12 +69,12 @@ def hide(scene: bpy.types.Scene) -> None:
 
 
 def show(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> None:
-    """Put up a marker for each sound of a voice, instead of those of any other voice.
+    """Add a marker for each sound of a voice, and remove markers of other voices.
 
     Args:
-        scene: gets them.
-        action: with a voice.
-        placing: where it lies in the scene.
+        scene: scene for the markers.
+        action: action with a voice.
+        placing: its place in the scene.
     """
     hide(scene)
     own = [(m.frame, m.name) for m in scene.timeline_markers]
@@ -103,18 +103,18 @@ def are_changed(scene: bpy.types.Scene, action: bpy.types.Action) -> bool:
 
 
 def take(scene: bpy.types.Scene, action: bpy.types.Action, placing: Placing) -> list[str]:
-    """Let the list, and the mouth's keys, follow the markers of a voice.
+    """Update the list and the keys of the mouth from the markers of a voice.
 
     Args:
-        scene: has the markers.
-        action: with a voice.
-        placing: where it lies in the scene.
+        scene: scene with the markers.
+        action: action with a voice.
+        placing: its place in the scene.
 
     Returns:
-        The names of markers that were moved past a neighbour: their sounds stay beside it.
+        The names of markers moved past a neighbour; their sounds stay beside it.
 
     Raises:
-        SpokenError: no marker is left, or one is called what stands for no sound; nothing changes.
+        SpokenError: no marker is left, or the name of a marker is no sound; nothing changes.
     """
     sounds = spoken_keys.sounds_of(action)
     end, board = spoken_keys.of(action).end, _board(scene)[1]

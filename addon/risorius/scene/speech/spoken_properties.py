@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a voice says as properties of its action: saved, appended, copied and undone with it."""
+"""Words and sounds of a voice as properties of its action: saved, appended, copied and undone with
+it."""
 
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
@@ -92,7 +93,7 @@ class RISORIUS_PG_sound(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_spoken(bpy.types.PropertyGroup):
-    """The sounds of a voice, and what its mouth is made of beside them."""
+    """The sounds of a voice, and further inputs of its mouth."""
 
     sounds: bpy.props.CollectionProperty(type=RISORIUS_PG_sound)
     active: bpy.props.IntProperty(name="Place", update=_jump, options=set(), min=0)
@@ -123,5 +124,5 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take it away; what files hold of it stays."""
+    """Remove the property; values in files stay."""
     delattr(bpy.types.Action, spoken_keys.PROPERTY)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which voices a face speaks, and where they lie in the scene."""
+"""The voices of a face, and their places in the scene."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from . import spoken_keys
 
 
 def all_of(controls: ArmatureObject) -> list[bpy.types.Action]:
-    """The actions with a voice that a face plays: of its chosen layer first, then its own, of NLA
-    strips and of other layers.
+    """The actions with a voice that a face plays: of the chosen layer, then its own action, NLA
+    strips and other layers.
 
     Args:
         controls: its control armature.
@@ -35,13 +35,13 @@ def _played(controls: ArmatureObject) -> Iterator[bpy.types.Action]:
 
 
 def placing(controls: ArmatureObject, action: bpy.types.Action) -> Placing:
-    """Where the frames of an action lie in the scene.
+    """The place of an action's frames in the scene.
 
-    Of a layer whose time is bent, and of one that plays more than once, the first pass counts.
+    For a layer with warped time or repeats, the first pass counts.
 
     Args:
         controls: the face's control armature.
-        action: one that it plays.
+        action: an action that it plays.
     """
     data = controls.animation_data
     if data is not None and data.action == action:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Camera, three lights and a backdrop around a face, in a collection of their own.
 
-They are the user's from then on: nothing of the face points to them, nothing looks for them.
+They belong to the user afterwards: nothing of the face refers to them.
 """
 
 from __future__ import annotations
@@ -23,12 +23,13 @@ _EDGE = (0.010, 0.011, 0.014, 1.0)
 
 
 def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.Collection:
-    """Build the studio of a face where it stands now, as large as its head.
+    """Build the studio of a face at its current place, scaled to its head.
 
     Args:
         context: a Blender context, to whose scene it is added.
         rig: deforming armature of the face.
-        scene_camera: make its camera the scene's; where the scene has none it becomes that anyway.
+        scene_camera: make its camera the camera of the scene; a scene without a camera always gets
+            it.
 
     Returns:
         The collection that holds all of it.
@@ -50,7 +51,8 @@ def add(context: Context, rig: ArmatureObject, scene_camera: bool) -> bpy.types.
 
 
 def _head(rig: ArmatureObject) -> tuple[Matrix, float, list[float], list[float]]:
-    """The head's place in the world without scale, the eyes' distance, and the face's box in it."""
+    """The head's matrix in the world without scale, the distance of the eyes, and the bounding box
+    of the face."""
     meshes = parts.meshes_of(rig)
     world = np.array(rig.matrix_world, np.float64)
     eyes = _eyes(rig)
@@ -77,9 +79,9 @@ def _places(item: MeshObject) -> np.ndarray:
 
 
 def _hem(places: list[np.ndarray], apart: float) -> float:
-    """How high the body ends in front, below the face, where it ends highest.
+    """Height of the body's lower end in front, at its highest place below the face.
 
-    A shirt's hem may hang lower at the sides, and a picture down to there would show its middle.
+    A hem may hang lower at the sides, and a picture down to there would show its gap in the middle.
 
     Args:
         places: float64[V, 3] of each mesh, in the head's axes.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What keeps characters whole: duplicates, renames, links, repairs, migrations of older files."""
+"""Upkeep of characters: duplicates, renames, links, repairs, migrations of older files."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Apply Transform, Set Origin and their relatives on a part of a face are taken back.
+"""Undo Apply Transform, Set Origin and similar steps on parts of a face.
 
-Joints, meshes and controls fit each other. Blender's steps move what an object had into its data:
-the rig, which follows the controls, would have its place twice, and a mesh would leave its joints.
-Blender asks nobody before and tells nobody after it, so what each part had is kept and compared.
+Joints, meshes and controls must fit each other. These steps move an object's transform into its
+data: the rig, which follows the controls, would have its place twice, and a mesh would leave its
+joints. Blender gives no notice of them, so the state of each part is stored and compared.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ class _Moved:
     stands: Matrix
 
 
-# Session uid of a part, or of what hangs on one -> what was seen of it.
+# Session uid of a part or its child -> its stored state.
 _noted: dict[int, _Seen] = session.table("applied_transforms.noted", ("undo", "load"))
-# Session uid of a deforming armature -> what was taken back last.
+# Session uid of a deforming armature -> sentence about the last undone step.
 _said: dict[int, Sentence] = session.table("applied_transforms.said", ("undo", "load"))
 
 
@@ -70,14 +70,14 @@ def last_said(rig: ArmatureObject) -> Sentence | None:
 def take_back(
     rigs: Iterable[ArmatureObject], touched: AbstractSet[bpy.types.ID]
 ) -> list[ArmatureObject]:
-    """Give the parts of faces back what one of Blender's steps just moved into their data.
+    """Restore the parts of faces after a step of Blender that moved transforms into data.
 
     Args:
         rigs: deforming armatures of this file.
         touched: the datablocks of the update.
 
     Returns:
-        Those whose parts were given something back; `last_said` says what.
+        Armatures with restored parts; `last_said` has the sentence.
     """
     known = bool(_noted)
     done = [rig for rig in rigs if _take_back(rig, touched)]
@@ -116,7 +116,7 @@ def _take_back(rig: ArmatureObject, touched: AbstractSet[bpy.types.ID]) -> bool:
 
 
 def _see(item: bpy.types.Object, before: _Seen | None, touched: AbstractSet[bpy.types.ID]) -> _Seen:
-    """The state of a part now; points are read only where a change was noted."""
+    """The current state of a part; points are read only after a noted change."""
     if before is not None and item not in touched:
         return before
     parent, data = item.parent.session_uid if item.parent is not None else 0, item.data
@@ -167,7 +167,7 @@ def _places(
     seen: Mapping[bpy.types.Object, _Seen],
     known: Mapping[bpy.types.Object, Matrix],
 ) -> dict[bpy.types.Object, Matrix]:
-    """Where the parts of a face are in the world, those with a foreign parent in its space."""
+    """Matrices of the parts of a face in the world, or in the space of a foreign parent."""
     found = {item: known.get(item, _local(one)) for item, one in seen.items()}
     carried = [i for i in seen if i.parent == rig and i.parent_type == "OBJECT" and rig in found]
     found.update({item: found[rig] @ found[item] for item in carried})
@@ -196,7 +196,7 @@ def _give_back(moved: _Moved, now: _Seen, members: Collection[bpy.types.Object])
             data.transform(back)
         data.update_tag()
     item.matrix_parent_inverse = before.hung
-    # Frames move an armature without an update, so what was noted of it may be of another frame.
+    # Frames move an armature without an update, so its stored state may be of another frame.
     same = item.parent is not None or now.own == before.own
     item.matrix_basis = before.own if same else moved.stood
     for child in item.children:
@@ -225,20 +225,20 @@ def _differ(one: Matrix, other: Matrix) -> bool:
 
 
 def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
-    """What hangs on a part hangs as before: Blender keeps its place, but not under every bone."""
+    """Restore the place of children of a part; Blender keeps it, but not under every bone."""
     before = _noted.get(child.session_uid)
     if before is not None and before.parent == moved.item.session_uid:
         child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own
 
 
 def _is_held(item: bpy.types.Object) -> bool:
-    """Whether a part can be moved by nothing that asks: its place is locked and not animated."""
+    """Whether the place of a part is locked and not animated."""
     locked = all((*item.lock_location, *item.lock_rotation, *item.lock_scale))
     return locked and item.animation_data is None and not item.constraints
 
 
 def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
-    """What brings a part's data to where they were, or None where no such step was done."""
+    """The matrix that moves a part's data back, or None if no such step happened."""
     old, new = (
         np.frombuffer(seen.points, np.float32).reshape(-1, 3).astype(np.float64)
         for seen in (moved.before, now)
@@ -255,7 +255,7 @@ def _way_back(moved: _Moved, now: _Seen) -> Matrix | None:
     near = _NEAR * max(np.abs(old).max(), np.abs(new).max())
     if np.abs(old - new - shift).max() > near or np.abs(shift).max() <= near:
         return None
-    # Where a constraint carries an object, Set Origin moves it by too much or too little.
+    # On an object with a constraint, Set Origin moves it too far or not far enough.
     told = moved.before.own.translation != now.own.translation or _is_centred(moved.item)
     return Matrix.Translation(Vector(shift.tolist())) if told else None
 
@@ -266,7 +266,7 @@ def _at(place: Matrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _is_centred(item: bpy.types.Object) -> bool:
-    """Whether an object's data lie around its origin, as Geometry to Origin leaves them."""
+    """Whether an object's data are centred on its origin, as after Geometry to Origin."""
     if item.type == "MESH":
         points = _read(cast("MeshObject", item).data.vertices, "co")
     else:

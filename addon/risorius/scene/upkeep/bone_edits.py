@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether the bones of an armature were edited, or Blender only says so.
+"""Whether the bones of an armature were really edited.
 
-A step of a slider in the sidebar tags its object's geometry, and with it the armature, as if its
-bones had changed.
+Moving a slider in the sidebar tags the armature as if its bones had changed.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ _seen: dict[int, tuple[Sequence[object], bytes]] = session.table(
 
 
 def is_edited(armature: bpy.types.Armature) -> bool:
-    """Whether an armature has other bones than when this was last asked, or was never asked.
+    """Whether the bones of an armature changed since the last call; True at the first call.
 
     Args:
         armature: of a deforming or a control armature, the original.

@@ -16,10 +16,10 @@ from ..skinning import ordinary
 
 
 def separate_all() -> list[str]:
-    """Separate every character from those it was copied from.
+    """Separate every character from its original.
 
     Returns:
-        Sentences on what was changed, for a report.
+        Sentences about changes, for a report.
     """
     done = []
     for rig in parts.rigs():
@@ -28,13 +28,13 @@ def separate_all() -> list[str]:
 
 
 def separate(rig: ArmatureObject) -> list[str]:
-    """Give a character what it still shares with another.
+    """Make the shared data of a character its own.
 
     Args:
         rig: its deforming armature.
 
     Returns:
-        Sentences on what was changed.
+        Sentences about changes.
     """
     done = []
     controls = parts.controls_of(rig)
@@ -62,7 +62,7 @@ def separate(rig: ArmatureObject) -> list[str]:
 
 
 def _own_mesh(item: MeshObject) -> list[str]:
-    """A mesh datablock of its own, where it has shapes that another object shows too."""
+    """Give a mesh object its own mesh datablock, if another object uses its shapes too."""
     if item.data.users < 2 or item.data.shape_keys is None:
         return []
     users = [o for o in bpy.data.objects if o.data == item.data]
@@ -100,7 +100,7 @@ def retarget_materials(item: MeshObject, rig: ArmatureObject) -> None:
 
     Args:
         item: the mesh object.
-        rig: deforming armature of the character whose maps drivers read from now on.
+        rig: deforming armature whose maps the drivers will read.
     """
     for slot in item.material_slots:
         if slot.material is not None:

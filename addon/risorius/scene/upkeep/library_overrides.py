@@ -41,15 +41,15 @@ def make_override(
     """Override a linked character so that it can be animated here.
 
     Args:
-        context: scene and view layer that get it, and the active object that shows it.
+        context: scene and view layer for it, and the active object that instances it.
         rig: the linked deforming armature.
-        local_meshes: copy the meshes into this file; else their real keys are driven.
+        local_meshes: True: copy the meshes into this file; False: drive their real keys.
 
     Returns:
         The override's deforming armature, and sentences for a report.
 
     Raises:
-        FaceError: Blender made no override; the text says of what.
+        FaceError: Blender made no override; the text names the datablock.
     """
     shown = _instance_of(context, rig)
     root: Any = shown.instance_collection if shown else _linked_root(rig)
@@ -74,9 +74,9 @@ def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) ->
     """Make an override that Blender made by itself fully editable.
 
     Args:
-        context: its view layer is brought up to date.
+        context: its view layer is updated.
         rig: deforming armature of the override.
-        local_meshes: copy the meshes into this file; else their real keys are driven.
+        local_meshes: True: copy the meshes into this file; False: drive their real keys.
 
     Returns:
         Sentences for a report.
@@ -94,7 +94,8 @@ def repair(context: Context, rig: ArmatureObject, local_meshes: bool = False) ->
 
 
 def own_shapes(rig: ArmatureObject, local_meshes: bool) -> list[str]:
-    """Let shapes of an override move: meshes of this file where keys cannot be driven.
+    """Make shapes of an override movable; meshes whose keys cannot be driven are copied into this
+    file.
 
     Args:
         rig: the override's deforming armature.
@@ -133,7 +134,7 @@ def unlock_shapes(rig: ArmatureObject) -> bool:
 
 
 def trouble(rig: ArmatureObject) -> str:
-    """What Blender refused to let us write on an override; empty when all is well."""
+    """A sentence about refused writes to an override; empty if none was refused."""
     names = [item.name for item in evaluate.refused(rig)]
     if rig.override_library is not None and rig.override_library.is_system_override:
         names = names or [rig.name]
@@ -143,10 +144,11 @@ def trouble(rig: ArmatureObject) -> str:
 
 
 def _localize(item: MeshObject, owned: dict[str, bpy.types.Material]) -> None:
-    """A mesh of this file, with its own copies of those materials that are overrides.
+    """Copy a mesh into this file, with copies of its override materials.
 
-    Without the mesh they would stand outside the override's hierarchy, and Blender would delete
-    them when the library changes. Args: owned  override material's name -> copy, filled here.
+    Without the mesh these materials would be outside the hierarchy of the override, and Blender
+    would delete them when the library changes. Args: owned  override material's name -> copy,
+    filled here.
     """
     left = [item.data, *item.data.materials]
     item.data = _local_copy(item.data)
@@ -173,7 +175,7 @@ def _overrides(item: bpy.types.ID, linked: bpy.types.ID) -> bool:
 
 
 def _instance_of(context: Context, rig: ArmatureObject) -> bpy.types.Object | None:
-    """The active object, where it is an instance of the collection that holds the rig."""
+    """The active object, if it is an instance of the collection with the rig."""
     item = context.object
     if item is None or item.library or item.instance_type != "COLLECTION":
         return None
@@ -182,7 +184,7 @@ def _instance_of(context: Context, rig: ArmatureObject) -> bpy.types.Object | No
 
 
 def _linked_root(rig: ArmatureObject) -> bpy.types.Collection | ArmatureObject:
-    """The linked collection that local ones hold, with this rig in it; else the rig itself."""
+    """The linked collection with this rig inside a local one, or the rig itself."""
     homes = [s.collection for s in bpy.data.scenes if s.library is None]
     homes += [c for c in bpy.data.collections if c.library is None]
     for home in homes:
@@ -193,14 +195,14 @@ def _linked_root(rig: ArmatureObject) -> bpy.types.Collection | ArmatureObject:
 
 
 def _unlink(scene: bpy.types.Scene, collection: bpy.types.Collection) -> None:
-    """Take a linked collection out of a scene: its override stands there instead."""
+    """Remove a linked collection from a scene, because its override replaces it."""
     for home in (scene.collection, *scene.collection.children_recursive):
         if home.library is None and collection in home.children[:]:
             home.children.unlink(collection)
 
 
 def _take_place(shown: bpy.types.Object, rig: ArmatureObject, collection: bpy.types.ID) -> None:
-    """Put an override where its instance stood, and let the instance show nothing."""
+    """Move an override to the place of its instance, and empty the instance."""
     place = shown.matrix_world.copy()
     shown.instance_collection = None
     shown.instance_type = "NONE"

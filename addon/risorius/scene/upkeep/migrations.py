@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Characters of older files are brought to the present form, one step for each number.
+"""Update characters of older files to the current form, one step for each number.
 
-Nothing is done to linked ones, which cannot be written: what reads them understands every form.
-Nothing is brought down: a character of a newer form plays as far as this version knows it.
+Linked characters cannot be written, so readers understand every form. A character of a newer form
+stays as it is and plays with the features that this version knows.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ _said: set[int] = session.keep("migrations.said", set, ("load",))
 
 
 def bring_up_all() -> list[str]:
-    """Bring every character of this file to the present form.
+    """Update every character of this file to the current form.
 
     Returns:
-        Sentences on what was changed, and on characters of newer forms.
+        Sentences about changes and about characters of newer forms.
     """
     done = []
     for rig in parts.rigs(linked=True):
@@ -48,8 +48,8 @@ def _bring_up(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
     if reached > found:
         if form.VERSION in controls:
             del controls[form.VERSION]  # it may be no number
-        # Of an override of an older library it is lost when the file is saved: it is brought up
-        # anew.
+        # For an override of an older library the number is lost when the file is saved, so it is
+        # updated again.
         controls[form.VERSION] = reached
     late = caches.words(rig) if rig.session_uid not in _said else ""
     if late:
@@ -66,7 +66,7 @@ def _say_once(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def newer(rig: ArmatureObject) -> str:
-    """A sentence where a character is of a newer form than this version knows, else empty."""
+    """A sentence if a character has a newer form than this version knows, else empty."""
     controls = parts.controls_of(rig)
     found = form.version_of(controls) if controls is not None else 0
     if found <= form.PRESENT:
@@ -78,7 +78,7 @@ def newer(rig: ArmatureObject) -> str:
 
 
 def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
-    """It says what it needs; a baked one keeps what it silenced by name."""
+    """Add the property Needs Risorius; store muted tracks of a baked character by name."""
     changed = []
     if not controls.override_library:
         controls[form.NEEDS] = form.WORDS
@@ -91,7 +91,7 @@ def _to_1(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
 
 
 def _to_2(rig: ArmatureObject, _controls: ArmatureObject) -> list[str] | None:
-    """Simulations see the face of their own frame: what was baked before is late."""
+    """Simulations see the face of their own frame; older bakes are marked as late."""
     if caches.note_old(rig):
         return None
     if caches.have_nodes(rig):

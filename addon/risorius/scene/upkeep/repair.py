@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a rename or a deletion took away: mended where that is safe, said in words where not.
+"""Repair of renamed and deleted parts if this is safe, otherwise a sentence.
 
-Objects, meshes, materials, collections, actions and joints' bones may have any name. The names
-of control bones and sliders are a contract with actions, pose assets and scripts, so they are
-given back.
+Objects, meshes, materials, collections, actions and joints' bones may have any name. Actions, pose
+assets and scripts depend on the names of control bones and sliders, so these are restored.
 """
 
 from __future__ import annotations
@@ -19,13 +18,13 @@ from ..character import armatures, build, meshes, runtime
 
 
 def heal(rig: ArmatureObject) -> list[str]:
-    """Give control bones and sliders of a character their names back.
+    """Restore the names of control bones and sliders of a character.
 
     Args:
         rig: its deforming armature, of this file.
 
     Returns:
-        Sentences on what was mended.
+        Sentences about repairs.
     """
     controls = rig.get(parts.CONTROLS)
     if not isinstance(controls, bpy.types.Object) or controls.type != "ARMATURE":
@@ -38,10 +37,10 @@ def heal(rig: ArmatureObject) -> list[str]:
 
 
 def heal_all() -> list[ArmatureObject]:
-    """Mend every character of this file; what was mended goes to the console.
+    """Repair every character of this file and print the repairs to the console.
 
     Returns:
-        The deforming armatures of those that were mended.
+        The deforming armatures of repaired characters.
     """
     mended = []
     for rig in parts.rigs():
@@ -66,7 +65,7 @@ def _bone_names(controls: ArmatureObject) -> list[str]:
 
 
 def _sliders(rig: ArmatureObject) -> list[str]:
-    """Make sliders that are gone or of another type anew as floats."""
+    """Create missing sliders again, and sliders of another type as floats."""
     face, live = parts.face_bone(rig), runtime.of(rig)
     if face is None or live is None:
         return []
@@ -89,13 +88,13 @@ def _sliders(rig: ArmatureObject) -> list[str]:
 
 
 def missing(item: bpy.types.Object | None) -> list[str]:
-    """What the character that an object belongs to has lost.
+    """The lost parts of an object's character.
 
     Args:
         item: any object, or None.
 
     Returns:
-        Sentences; empty where all is there or where the object is no part of a character.
+        Sentences; empty if nothing is lost or the object belongs to no character.
     """
     rig = _rig_of_ruin(item)
     if rig is None:
@@ -152,14 +151,14 @@ def outside(rig: ArmatureObject) -> list[bpy.types.Object]:
 
 
 def bring_back(item: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Put deleted parts back into the collection of those that are left.
+    """Restore deleted parts into the collection of the remaining ones.
 
     Args:
         item: an object of the character.
-        scene: where they go if no part is in a collection.
+        scene: target if no part is in a collection.
 
     Returns:
-        The objects that were brought back.
+        The restored objects.
     """
     rig = _rig_of_ruin(item)
     if rig is None:
@@ -175,10 +174,10 @@ def bring_back(item: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types
 def remove_dead() -> int:
     """Remove characters whose parts were all deleted.
 
-    The parts point to each other, so Blender would keep them, and save them, for ever.
+    The parts refer to each other, so Blender would keep and save them for ever.
 
     Returns:
-        How many were removed.
+        The number of removed characters.
     """
     dead = [rig for rig in parts.rigs() if _is_dead(rig)]
     for rig in dead:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is there: preferences, the list of what a face is made of, milliseconds per stage."""
+"""Preferences, the list of a face's contents, and the timing overlay."""
 
 from . import operators, preferences
 

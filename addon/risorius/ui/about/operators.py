@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a face is made of, as a list; the self-test."""
+"""The list of a face's contents, and the self-test."""
 
 import bpy
 import numpy as np
@@ -15,7 +15,7 @@ from ..common import FaceOperator, face_rig, usable
 
 
 def describe(rig: ArmatureObject) -> list[str]:
-    """What a face is made of, a line per mesh: shapes that move nothing are named.
+    """The contents of a face, a line for each mesh, with shapes that move nothing.
 
     Args:
         rig: its deforming armature.
@@ -61,7 +61,7 @@ def describe(rig: ArmatureObject) -> list[str]:
 
 
 class RISORIUS_OT_describe(FaceOperator, Operator):
-    """List what the active face is made of, mesh by mesh"""
+    """List the parts of the active face, mesh by mesh"""
 
     bl_idname = "risorius.describe"
     bl_label = "Contents of the Face"
@@ -82,7 +82,7 @@ class RISORIUS_OT_describe(FaceOperator, Operator):
 
 
 def self_test_rows() -> tuple[list[tuple[str, bool, str]], str]:
-    """The checks of the wheel and what they ran in, and the report as text.
+    """The checks of the wheel, their environment, and the report as text.
 
     Raises:
         UnusableError: the native module is missing or of another version.
@@ -124,7 +124,7 @@ class RISORIUS_OT_self_test(Operator):
 
 
 class RISORIUS_OT_hide_hints(Operator):
-    """Do not say again what to do with a new face; the preferences bring it back"""
+    """Hide the first steps; the preferences show them again"""
 
     bl_idname = "risorius.hide_hints"
     bl_label = "Hide First Steps"

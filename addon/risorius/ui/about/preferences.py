@@ -46,7 +46,7 @@ class RISORIUS_Preferences(AddonPreferences):
 
     sides: bpy.props.EnumProperty(
         name="Left and Right",
-        description="Whose left and right sliders are named and placed by",
+        description="Sides that name and place the left and right sliders",
         items=(
             ("SEEN", "As Seen", "Left is on the left of a face that looks at you"),
             ("OWN", "The Character's", "Left is the character's own left, as in a body's bones"),
@@ -55,13 +55,13 @@ class RISORIUS_Preferences(AddonPreferences):
 
     hints: bpy.props.BoolProperty(
         name="First Steps",
-        description="Say beside a face that nobody has moved yet what to do with it",
+        description="Show the first steps beside a face that was not moved yet",
         default=True,
     )
 
     expression_library: bpy.props.StringProperty(
         name="Expression Library",
-        description="Folder of expressions that all files share; empty for the extension's own",
+        description="Folder of expressions for all files; empty: the folder of the extension",
         subtype="DIR_PATH",
     )
     favourites: bpy.props.StringProperty(options={"HIDDEN"})
@@ -81,7 +81,7 @@ class RISORIUS_Preferences(AddonPreferences):
 
 
 class RISORIUS_Idle(AddonPreferences):
-    """The preferences of a copy that does nothing because another one is in use."""
+    """The preferences of a copy that is idle because another copy is in use."""
 
     bl_idname = native.ADDON
 
@@ -90,7 +90,7 @@ class RISORIUS_Idle(AddonPreferences):
 
 
 def twice(other: str) -> str:
-    """What to do where another copy is in use.
+    """The sentence about another copy in use.
 
     Args:
         other: its module, bl_ext.REPOSITORY.risorius.

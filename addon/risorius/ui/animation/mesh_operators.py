@@ -19,7 +19,7 @@ from .place_clip import PlacesClip
 
 
 class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
-    """Find the controls that repeat a moving mesh of the face's own topology, frame by frame"""
+    """Find control curves that repeat a moving mesh with the topology of the face"""
 
     bl_idname = "risorius.curves_from_mesh"
     bl_label = "Control Curves from Mesh"
@@ -27,26 +27,29 @@ class RISORIUS_OT_curves_from_mesh(RunsBeside, PlacesClip, Operator):
 
     source: bpy.props.StringProperty(
         name="Object",
-        description="A mesh with the face's own vertices; empty: the selected, else the only one",
+        description=(
+            "Mesh with the vertices of the face; empty: the selected mesh, or the only one"
+        ),
         options={"SKIP_SAVE"},
     )
-    first: bpy.props.IntProperty(name="First Frame", description="Of what is taken", default=1)
-    last: bpy.props.IntProperty(name="Last Frame", description="Of what is taken", default=250)
+    first: bpy.props.IntProperty(name="First Frame", description="Frame range to solve", default=1)
+    last: bpy.props.IntProperty(name="Last Frame", description="Frame range to solve", default=250)
     use_relative: bpy.props.BoolProperty(
         name="Movement Only",
-        description="Take how the mesh moves from its rest and not its shape: for another face of "
-        "the same topology",
+        description=(
+            "Use the motion of the mesh and not its form: for another face of the same topology"
+        ),
     )
     sparse: bpy.props.FloatProperty(
         name="Few Controls",
-        description="How much it costs to use a control; 0: nothing",
+        description="Cost of using a control; higher values use fewer controls",
         default=1.0,
         min=0.0,
         soft_max=4.0,
     )
     smooth: bpy.props.FloatProperty(
         name="Quiet Curves",
-        description="How much a sudden change costs, where the mesh is noisy; 0: nothing",
+        description="Cost of sudden changes; higher values smooth a noisy mesh",
         default=1.0,
         min=0.0,
         soft_max=4.0,

@@ -26,22 +26,30 @@ RATES = (
     (
         "FRAMES",
         "Whole Frames",
-        "Keys lie on the scene's frames, where hands and eyes look for them",
+        "Insert keys on whole frames of the scene",
     ),
-    ("TIME", "Every Sample", "A key for each sample at its time, between frames where need be"),
-    ("SCENE", "Set Scene Rate", "The scene takes over the rate of the file; a key for each sample"),
+    ("TIME", "Every Sample", "Insert a key for each sample at its own time, also between frames"),
+    (
+        "SCENE",
+        "Set Scene Rate",
+        ("Set the scene to the rate of the file and insert a key for each sample"),
+    ),
 )
 CAPTURE_RANGES = (
     (
         "FACE",
         "Of the Face",
-        "Captures are stretched by the range that this face has, see the panel Capture Range",
+        "Use the range of this face from the panel Capture Range",
     ),
-    ("TAKE", "Of This File", "Neutral and extremes are learned from the file, for it alone"),
+    ("TAKE", "Of This File", "Learn the range from this file"),
     ("NONE", "None", "Values stay as captured"),
 )
 TIME_UNITS = (
-    ("AUTO", "As the File Says", "Its header names the unit, or its numbers show it"),
+    (
+        "AUTO",
+        "As the File Says",
+        ("Read the unit from the header, or from the size of the numbers"),
+    ),
     ("S", "Seconds", ""),
     ("MS", "Milliseconds", ""),
     ("US", "Microseconds", ""),
@@ -49,10 +57,14 @@ TIME_UNITS = (
     ("MIN", "Minutes", ""),
     ("H", "Hours", ""),
     ("FRAMES", "Frame Numbers", "At the rate of the file"),
-    ("ROWS", "Rows", "Its times are left aside: each row is a frame at the rate of the file"),
+    ("ROWS", "Rows", "Ignore the times: each row is a frame at the rate of the file"),
 )
 ANGLES = (
-    ("AUTO", "As the File Says", "Radians; what no head can turn is asked about"),
+    (
+        "AUTO",
+        "As the File Says",
+        ("Radians; angles that no head can turn are refused with a question"),
+    ),
     ("RADIANS", "Radians", ""),
     ("DEGREES", "Degrees", ""),
 )
@@ -76,21 +88,21 @@ SOUNDS = (".wav", ".mp3", ".flac", ".ogg", ".m4a", ".aac", ".opus", ".mp4", ".mo
 @session.cached(("unregister",))
 def _kinds() -> list[Item]:
     kinds = native.part("importing").KINDS.items()
-    return [("AUTO", "Automatic", "Told from the file"), *((k, t, "") for k, t in kinds)]
+    return [("AUTO", "Automatic", "Detect from the file"), *((k, t, "") for k, t in kinds)]
 
 
 @session.cached(("unregister",))
 def _mappings() -> list[Item]:
     importing = native.part("importing")
     return [
-        ("AUTO", "Automatic", "The one that knows the file's names"),
+        ("AUTO", "Automatic", "The mapping that knows most names of the file"),
         ("FILE", "File", "A mapping of your own, a TOML file"),
         *((name, importing.mapping_title(name), "") for name in importing.mapping_names()),
     ]
 
 
 class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
-    """Bring a capture, a table of curves, a viseme track or a clip onto the active face"""
+    """Import a capture, a table of curves, a viseme track or a clip onto the active face"""
 
     bl_idname = "risorius.import_animation"
     bl_label = "Import Animation"
@@ -100,33 +112,33 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         default=";".join(f"*{e}" for e in EXTENSIONS), options={"HIDDEN"}
     )
     kind: bpy.props.EnumProperty(
-        name="Kind", description="What kind of file it is", items=lambda _s, _c: _kinds()
+        name="Kind", description="Kind of the file", items=lambda _s, _c: _kinds()
     )
     mapping: bpy.props.EnumProperty(
         name="Mapping",
-        description="Which controls the file's curves move",
+        description="Mapping from curves of the file to controls",
         items=lambda _s, _c: _mappings(),
     )
     mapping_file: bpy.props.StringProperty(
         name="Mapping File", description="A TOML file", subtype="FILE_PATH"
     )
     rate_mode: bpy.props.EnumProperty(
-        name="Keys", description="Where the file's samples become keys", items=RATES
+        name="Keys", description="Frames at which samples of the file become keys", items=RATES
     )
     file_rate: bpy.props.FloatProperty(
         name="File Rate",
-        description="Frames per second of a file that does not say it; 0: as found",
+        description="Frames per second of a file that does not state its rate; 0: as found",
         min=0.0,
         soft_max=240.0,
     )
     capture_range: bpy.props.EnumProperty(
         name="Range",
-        description="Which values of the capture become 0 and 1, so that blinks close the eyes",
+        description="Range of the capture that becomes 0 to 1, so that blinks close the eyes",
         items=CAPTURE_RANGES,
     )
     timecode_rate: bpy.props.FloatProperty(
         name="Timecode Rate",
-        description="Frames that timecodes count a second, where they do not tell; 0: as found",
+        description="Frames a second of the timecode, if the file does not show it; 0: as found",
         min=0.0,
         soft_max=240.0,
     )
@@ -137,8 +149,11 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     full_value: bpy.props.FloatProperty(
         name="Full Value",
-        description="The file's value of a whole movement: 100 for per cent, 255 for bytes, 1 "
-        "keeps values however large; 0: 1, and values far above it are asked about",
+        description=(
+            "Value of a full movement in the file: 100 for per cent, 255 for "
+            "bytes; 1 keeps all values. 0: like 1, but values far above 1 are"
+            " refused with a question"
+        ),
         min=0.0,
         soft_max=255.0,
     )
@@ -155,12 +170,13 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     smoothing: bpy.props.FloatProperty(
         name="Smoothing",
-        description="Seconds around each sample that are smoothed together; 0: none",
+        description="Length of the smoothing window in seconds; 0: no smoothing",
         min=0.0,
         soft_max=0.5,
     )
     use_neutral: bpy.props.BoolProperty(
-        name="Calibrate", description="Make the face of some frames of the file the neutral one"
+        name="Calibrate",
+        description=("Use the face of some samples of the file as the neutral face"),
     )
     neutral_first: bpy.props.IntProperty(
         name="Neutral From", description="Sample of the file, from 0", min=0
@@ -170,7 +186,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
     )
     use_eyes: bpy.props.BoolProperty(
         name="Turn Eye Bones",
-        description="Where the file has the eyes' angles, turn the eye bones too",
+        description="Turn the eye bones too, if the file has angles of the eyes",
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -242,7 +258,7 @@ class RISORIUS_OT_import_animation(PlacesClip, Operator, ImportHelper):
         unknown_curves.keep(controls, found)
 
     def _note_unknown(self, context: Context, error: Exception) -> None:
-        """Of a file of which no mapping knows any curve all of them."""
+        """Note all curves of a file that no mapping knows."""
         names = getattr(error, "unknown", ())
         if names:
             self._keep_unknown(face_controls(context), "", names)
@@ -338,7 +354,7 @@ def _gains(text: str) -> dict[str, float]:
 
 
 def lines_of(report: "native.Report") -> list[str]:
-    """What a report of risorius.importing has to say, a line each."""
+    """The sentences of a report of risorius.importing, one in each line."""
     lines = [f"{len(report.mapped)} curves mapped by {report.mapping}."]
     told = [(head, names) for head, names in report.lists() if names != report.absent]
     lines += [f"{head[:1].upper()}{head[1:]}: {', '.join(names)}." for head, names in told]
@@ -360,7 +376,7 @@ class RISORIUS_FH_animation(FileHandler):
 
 
 class RISORIUS_OT_import_arkit_rig(PlacesClip, Operator):
-    """Take over the shape-key animation of a selected object: action, NLA strips and drivers"""
+    """Copy the shape-key animation of a selected object: action, NLA strips and drivers"""
 
     bl_idname = "risorius.import_arkit_rig"
     bl_label = "From ARKit Rig"

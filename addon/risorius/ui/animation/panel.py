@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel from which animation comes in, with what the last import had to say."""
+"""The panel for importing animation, with the report of the last import."""
 
 from ...scene.animation import speech_task
 from .. import words

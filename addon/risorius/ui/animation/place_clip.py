@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""How an operator puts a clip onto the active face, and what it reports."""
+"""Putting a clip onto the active face, and its report."""
 
 from collections.abc import Sequence
 
@@ -22,12 +22,12 @@ from ..words import say
 TARGETS = (
     ("ACTION", "Action", "As the face's active action; the one before is kept"),
     ("STRIP", "NLA Strip", "On a new NLA track"),
-    ("LAYER", "Layer", "As a layer above what the face does already"),
+    ("LAYER", "Layer", "As a layer above the existing animation"),
 )
 RANGES = (
-    ("EXTEND", "Extend", "The scene ends where the animation ends, if that is later"),
-    ("FIT", "Fit", "The scene begins and ends with the animation"),
-    ("KEEP", "Keep", "The scene's range stays as it is"),
+    ("EXTEND", "Extend", "Extend the scene to the end of the animation"),
+    ("FIT", "Fit", "Fit the scene to the animation"),
+    ("KEEP", "Keep", "Keep the range of the scene"),
 )
 _REPORT = "risorius_report"  # on an action: words on what became of the file
 _SHOWN = 6
@@ -41,7 +41,9 @@ class PlacesClip(FaceOperator):
     )
     start: bpy.props.FloatProperty(
         name="Start Frame",
-        description="Where the time 0 of the animation lies: its first frame, or its sound's begin",
+        description=(
+            "Frame of time 0 of the animation: its first frame, or the start of its sound"
+        ),
         default=1.0,
     )
     scene_range: bpy.props.EnumProperty(
@@ -50,8 +52,10 @@ class PlacesClip(FaceOperator):
 
     use_rest: bpy.props.BoolProperty(
         name="Bring to Rest",
-        description="Controls that the animation does not move go to rest; else they stay as "
-        "they are, and the report names them",
+        description=(
+            "Set controls to 0 that the animation does not move. Off: they "
+            "keep their values, and the report names them"
+        ),
         options={"SKIP_SAVE"},
     )
 
@@ -79,13 +83,13 @@ class PlacesClip(FaceOperator):
             notes: lines for the report.
             with_eyes: whether to turn the eye bones too.
             whole: whether keys lie on whole frames only.
-            tolerance: of few keys with handles, see clip_actions.make_action; 0 for all keys.
+            tolerance: see clip_actions.make_action; 0: all keys.
 
         Returns:
             Its action.
 
         Raises:
-            ClipError: the NLA is being edited, or nothing of the clip is for this face.
+            ClipError: the NLA is being edited, or no curve of the clip fits this face.
         """
         rig = face_rig(context)
         trouble = actions.busy(face_controls(context))
@@ -115,7 +119,7 @@ class PlacesClip(FaceOperator):
         return made.action
 
     def _others(self, rig: ArmatureObject) -> list[str]:
-        """Bring controls that the animation does not move to rest, or say that they stay."""
+        """Set controls to rest that the animation does not move, or report that they stay."""
         found = standing.beside(rig)
         sentence = found.sentence
         if sentence is None:
@@ -150,6 +154,6 @@ class PlacesClip(FaceOperator):
 
 
 def report_of(action: bpy.types.Action | None) -> list[str]:
-    """What was said when an action was imported: lines."""
+    """The lines of the report of an imported action."""
     text = saved.text(action, _REPORT) if action is not None else ""
     return text.split("\n") if text else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an imported animation leaves as it was is brought to rest."""
+"""The operator that sets controls to rest that an imported animation does not move."""
 
 from collections.abc import Collection
 
@@ -11,7 +11,7 @@ from ..words import say
 
 
 class RISORIUS_OT_rest_others(HandOperator, Operator):
-    """Bring the controls to rest that no key, layer or driver moves and that stand elsewhere"""
+    """Set controls to 0 that no key, layer or driver moves"""
 
     bl_idname = "risorius.rest_others"
     bl_label = "Bring to Rest"

@@ -130,11 +130,13 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         default=True,
     )
     joints: bpy.props.IntProperty(
-        name="Joints", description="How many are made", default=120, min=2, max=1000
+        name="Joints", description="Number of joints", default=120, min=2, max=1000
     )
     levels: bpy.props.IntProperty(
         name="Levels of Detail",
-        description="Each with fewer joints and vertices than the one before",
+        description=(
+            "Number of levels of detail; each has fewer joints and vertices than the one before"
+        ),
         default=8,
         min=1,
         max=32,

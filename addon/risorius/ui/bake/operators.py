@@ -21,7 +21,7 @@ _SLICE = 0.05  # seconds of baking between two looks at the keyboard
 
 
 class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
-    """Write the animation of the selected faces into plain actions; the way back stays open"""
+    """Write the animation of the selected faces into plain actions; Back to Live undoes this"""
 
     bl_idname = "risorius.bake"
     bl_label = "Bake Face"
@@ -35,7 +35,7 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     )
     wanted: bpy.props.EnumProperty(
         name="Parts",
-        description="What is baked; the rest stays as it stands now",
+        description="Parts to bake; other parts keep their current state",
         items=(
             ("BONES", "Bones", "Bones of the deforming armature, and its place"),
             ("SHAPES", "Shapes", "Shape keys of the meshes"),
@@ -46,8 +46,11 @@ class RISORIUS_OT_bake(FrameRange, FacesOperator, Operator):
     )
     error: bpy.props.FloatProperty(
         name="Largest Error",
-        description="Leave keys out while lines between the others stay within this of every "
-        "baked value, in the units of each curve; 0 keeps a key at every frame",
+        description=(
+            "Remove keys as long as the curve stays within this distance of "
+            "every baked value, in the units of each curve; 0 keeps a key at "
+            "every frame"
+        ),
         default=0.0,
         min=0.0,
         soft_max=0.01,
@@ -171,8 +174,8 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
     bl_idname = "risorius.unbake"
     bl_label = "Back to Live"
     bl_description = (
-        "Let the controls move the selected faces again, as before they were baked. What was baked "
-        "is removed, except actions that you protected or use elsewhere"
+        "Let the controls move the selected faces again. Baked actions are removed, "
+        "except actions that you protected or use elsewhere"
     )
 
     @classmethod
@@ -195,7 +198,7 @@ class RISORIUS_OT_unbake(FacesOperator, Operator):
 
 
 class RISORIUS_OT_bake_physics(FaceOperator, Operator):
-    """Bake all simulations of the scene, with its faces where they are at each frame"""
+    """Bake all simulations of the scene with the faces of each frame"""
 
     bl_idname = "risorius.bake_physics"
     bl_label = "Bake Physics"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Bake and Export, and what the panel Face says of a face that is late."""
+"""The panel Bake and Export, and the sentence of the panel Face about a late face."""
 
 from ...scene.bake import bake_face
 from ...scene.base.blender_types import ArmatureObject
@@ -23,7 +23,7 @@ class RISORIUS_PT_out(FaceOnlyPanel, Panel):
         if text:
             words.write(column, text, "ACTION")
             column.operator(RISORIUS_OT_unbake.bl_idname, icon="LOOP_BACK")
-        # A dialog for each; the defaults are those of the last time.
+        # Each opens a dialog with the settings of the last time.
         column.operator_context = "INVOKE_DEFAULT"
         column.operator("risorius.bake", icon="ACTION")
         column.operator("risorius.export_animation", icon="EXPORT")
@@ -36,7 +36,7 @@ def draw_late(layout: UILayout, rig: ArmatureObject) -> None:
     """The sentence of the panel on a late face.
 
     Args:
-        layout: of the panel.
+        layout: layout of the panel.
         rig: deforming armature.
     """
     caches.look()

@@ -16,17 +16,17 @@ from ..common import FaceOperator, usable
 
 RANGES = (
     ("SCENE", "Scene", "The frame range of the scene"),
-    ("PREVIEW", "Preview", "The preview range, where one is set; else that of the scene"),
+    ("PREVIEW", "Preview", "The preview range if it is set, otherwise the range of the scene"),
     ("CUSTOM", "Custom", "Frames of your choice"),
 )
 
 
 def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]:
-    """The characters of the selected objects, else the active one; linked ones are left out.
+    """The characters of the selected objects, or the active one, without linked ones.
 
     Args:
         context: scene and selection.
-        every: all characters of the scene instead.
+        every: True: all characters of the scene.
     """
     items = context.scene.objects if every else context.selected_objects
     rigs = [parts.rig_of(item) for item in items]
@@ -38,11 +38,11 @@ def selected_rigs(context: Context, every: bool = False) -> list[ArmatureObject]
 
 
 class FacesOperator(FaceOperator):
-    """What operators on all selected faces share."""
+    """Base of operators on all selected faces."""
 
     every: bpy.props.BoolProperty(
         name="All Faces",
-        description="All faces of the scene, whatever is selected",
+        description="All faces of the scene, not only selected ones",
         options={"SKIP_SAVE"},
     )
 

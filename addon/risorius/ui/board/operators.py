@@ -23,7 +23,7 @@ from ..words import say
 
 LEADERS = (
     ("SLIDERS", "Sliders", "The sliders of the panel move the face"),
-    ("BOARD", "Board", "The face board moves the face; the sliders show what it gives"),
+    ("BOARD", "Board", "The face board moves the face; the sliders show its values"),
 )
 
 
@@ -31,10 +31,12 @@ KINDS = (
     (
         "PRIMARY",
         "Primary",
-        "Some 30 handles that lie as a face does: brows, lids, gaze, nose, cheeks, mouth, jaw, "
-        "tongue. What none leads to stays with its slider",
+        (
+            "Some 30 handles arranged like a face: brows, lids, gaze, nose, cheeks, "
+            "mouth, jaw, tongue. Other controls keep their sliders"
+        ),
     ),
-    ("COMPLETE", "Complete", "A handle for each control that the file gives its own board"),
+    ("COMPLETE", "Complete", "A handle for each GUI control of the file"),
 )
 
 
@@ -44,7 +46,8 @@ def _regions(_self: object, _context: object) -> list[tuple[str, str, str]]:
 
 
 class _Leading(FaceOperator):
-    """What operators share that may change what leads the face: no tweak is on meanwhile."""
+    """Base of operators that may switch between sliders and board; they need a face without an
+    active tweak."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -57,7 +60,7 @@ class _Leading(FaceOperator):
 
 
 class _OwnArmature(_Leading):
-    """What operators share that make or remove bones of the controls."""
+    """Base of operators that make or remove bones of the controls."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -73,7 +76,7 @@ class _OwnArmature(_Leading):
 
 
 class _OnBoard(HandOperator):
-    """What operators share that need a face board that leads."""
+    """Base of operators that need a leading face board."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -86,14 +89,14 @@ class _OnBoard(HandOperator):
 
 
 class RISORIUS_OT_add_board(_OwnArmature, Operator):
-    """Put a board of sliders beside the head, or bring back those of it that were deleted"""
+    """Add a face board beside the head, or restore its deleted handles"""
 
     bl_idname = "risorius.add_board"
     bl_label = "Add Face Board"
 
     kind: bpy.props.EnumProperty(
         name="Board",
-        description="Which board; where there is the other one, this takes its place in its pose",
+        description="Kind of board; it replaces the other kind and keeps the pose",
         items=KINDS,
         options={"SKIP_SAVE"},
     )
@@ -140,7 +143,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
         return len(board.handles_in(rig))
 
     def _lead(self, rig: ArmatureObject) -> None:
-        """Let a new board lead, unless keys of sliders would stand still by that."""
+        """Let a new board lead, unless sliders have keys."""
         if board_keys.animates_sliders(rig):
             self.report(
                 {"INFO"},
@@ -153,7 +156,7 @@ class RISORIUS_OT_add_board(_OwnArmature, Operator):
 
 
 def _take_up(context: Context, rig: ArmatureObject) -> None:
-    """Show a new board beside the head, its handles ready for the hand: in pose mode."""
+    """Show a new board beside the head, in pose mode."""
     controls = parts.controls_there(rig)
     if not controls.visible_get() or controls.hide_select:
         return
@@ -182,7 +185,7 @@ class RISORIUS_OT_frame_board(FaceOperator, Operator):
 
 
 class RISORIUS_OT_remove_board(_OwnArmature, Operator):
-    """Take the face board away; its pose goes to the sliders, keys stay in their actions"""
+    """Remove the face board; its pose goes to the sliders, keys stay in their actions"""
 
     bl_idname = "risorius.remove_board"
     bl_label = "Remove Face Board"
@@ -202,7 +205,8 @@ class RISORIUS_OT_remove_board(_OwnArmature, Operator):
 
 
 def _needs_board(cls: type[Operator], context: Context, missing: str) -> bool:
-    """Whether the face has a board; else the tooltip of the operator says what is missing."""
+    """Whether the face has a board; otherwise the tooltip of the operator says that it is
+    missing."""
     if _has_board(context):
         return True
     cls.poll_message_set(missing)
@@ -215,7 +219,7 @@ def _has_board(context: Context) -> bool:
 
 
 class RISORIUS_OT_lead(_Leading, Operator):
-    """Choose what moves the face: its sliders or its board. The pose goes over to it"""
+    """Choose whether sliders or the board move the face; the pose is converted"""
 
     bl_idname = "risorius.lead"
     bl_label = "Lead"
@@ -223,7 +227,7 @@ class RISORIUS_OT_lead(_Leading, Operator):
     by: bpy.props.EnumProperty(name="By", description="What moves the face", items=LEADERS)
     use_keys: bpy.props.BoolProperty(
         name="Convert Keys",
-        description="Convert the keys of the action, in a copy; the action of before is kept",
+        description="Convert the keys in a copy of the action; the original is kept",
         default=True,
     )
 
@@ -275,7 +279,7 @@ class RISORIUS_OT_reset_board(_OnBoard, Operator):
     bl_label = "Reset Board"
 
     selected: bpy.props.BoolProperty(
-        name="Selected Only", description="Only those that are selected", options={"SKIP_SAVE"}
+        name="Selected Only", description="Only selected handles", options={"SKIP_SAVE"}
     )
 
     def move(self, context: Context) -> Collection[str] | None:
@@ -300,7 +304,7 @@ class RISORIUS_OT_select_board(FaceOperator, Operator):
 
     region: bpy.props.EnumProperty(name="Region", items=_regions)
     extend: bpy.props.BoolProperty(
-        name="Add to Selection", description="Keep what is selected", options={"SKIP_SAVE"}
+        name="Add to Selection", description="Add to the selection", options={"SKIP_SAVE"}
     )
 
     @classmethod

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Face Board in Options, and what leads as the panel Controls shows it."""
+"""The panel Face Board in Options, and the choice between sliders and board in the panel
+Controls."""
 
 from ...scene.base.blender_types import ArmatureObject
 from ...scene.character import board, runtime
@@ -10,7 +11,7 @@ from .operators import LEADERS
 
 
 def draw_lead(layout: UILayout, controls: ArmatureObject, live: runtime.Runtime) -> bool:
-    """What leads the face, as a choice; nothing where there is no board.
+    """Draw the choice between sliders and board, if the face has a board.
 
     Args:
         layout: of the panel.
@@ -30,11 +31,11 @@ def draw_lead(layout: UILayout, controls: ArmatureObject, live: runtime.Runtime)
 
 
 def draw_kinds(layout: UILayout, kind: str | None) -> None:
-    """Buttons that add a board, or put the other kind in its place.
+    """Buttons that add a board or replace it by the other kind.
 
     Args:
         layout: of the panel or menu.
-        kind: that of the board which is there; None where there is none.
+        kind: kind of the existing board, or None.
     """
     if kind is None:
         button = layout.operator("risorius.add_board", icon="ADD")

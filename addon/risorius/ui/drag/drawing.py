@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is drawn over the 3D views while faces are dragged: points, pins, what moves, names.
+"""Drawing over the 3D views during a drag: points, pins, moving skin, names.
 
-The handlers are there only while something is to be drawn; `stop` takes them away.
+The handlers exist only while they are needed; `stop` removes them.
 """
 
 from dataclasses import dataclass, field
@@ -37,13 +37,13 @@ _LIFT = 0.002  # of the distance to the viewer that colours lie above the skin
 
 @dataclass
 class Shown:
-    """What is drawn now.
+    """The current drawing.
 
     Attributes:
         points: places in the world with a colour and a radius in pixels at an interface of 1.
-        lines: of text beside the first point.
+        lines: lines of text beside the first point.
         places: float64[V, 3] vertices of the coloured mesh, or None.
-        far: float64[V] how far each moved.
+        far: float64[V] motion of each vertex.
         triangles: int32[T, 3] of that mesh.
     """
 
@@ -69,13 +69,13 @@ def start(user: str) -> None:
 
 
 def show(context: Context, shown: Shown) -> None:
-    """Draw this. Args: context  whose views are drawn anew; shown  what."""
+    """Draw points, lines and colours. Args: context with the views to redraw; shown the drawing."""
     _shown.now = shown
     tag(context)
 
 
 def tag(context: Context) -> None:
-    """Have all 3D views drawn anew. Args: context  has the window manager."""
+    """Redraw all 3D views. Args: context has the window manager."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -83,7 +83,7 @@ def tag(context: Context) -> None:
 
 
 def end(context: Context, user: str) -> None:
-    """Draw no more for an operator. Args: context  whose views are drawn anew; user  as `start`."""
+    """Stop drawing for an operator. Args: context with the views to redraw; user see `start`."""
     _users.discard(user)
     if not _users:
         stop()
@@ -103,7 +103,8 @@ def is_drawing() -> bool:
 
 
 def colours_of(far: Float) -> Float32:
-    """float32[V, 4]: what moves farthest is the most opaque. Args: far  float64[V] moves."""
+    """float32[V, 4]: the vertex that moves farthest is the most opaque. Args: far float64[V]
+    motion."""
     most = float(far.max(initial=0.0))
     share = np.clip(far / most, 0.0, 1.0) if most > 0 else np.zeros(len(far))
     colours = np.empty((len(far), 4), np.float32)
@@ -139,14 +140,14 @@ def _draw_heat() -> None:
 
 
 def draw_points(context: Context, marks: list[Mark]) -> Vector | None:
-    """Draw points over the region that is drawn now.
+    """Draw points over the current region.
 
     Args:
         context: of a drawing handler.
         marks: the points.
 
     Returns:
-        Where in the region the first of them is that is seen.
+        Place of the first visible point in the region.
     """
     region, data = context.region, _view()
     if region is None or data is None:
@@ -172,7 +173,8 @@ def _draw_marks() -> None:
 
 
 def _write(lines: list[str], at: Vector, scale: float) -> None:
-    """Lines beside a place, on a dark board: outlines of bones lie under them."""
+    """Draw lines beside a place on a dark background, so that outlines of bones do not disturb
+    them."""
     blf.size(0, round(12 * scale))
     wide = max(blf.dimensions(0, text)[0] for text in lines)
     left, top = at.x + 16 * scale, at.y + 24 * scale

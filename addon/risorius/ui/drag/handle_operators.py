@@ -17,7 +17,7 @@ from . import pointing, view
 
 
 class _PointOperator(FaceOperator):
-    """What operators on one point share: its number, or what lies under the cursor."""
+    """Base of operators on one point, given by number or by the cursor."""
 
     mesh: bpy.props.IntProperty(
         name="Mesh", description="Number of the mesh in the DNA", min=0, options={"SKIP_SAVE"}
@@ -45,7 +45,7 @@ class _PointOperator(FaceOperator):
 
 
 class RISORIUS_OT_pin(_PointOperator, Operator):
-    """Hold a point of the skin while others are dragged, or let it go"""
+    """Pin a point of the skin while you drag others, or remove its pin"""
 
     bl_idname = "risorius.pin"
     bl_label = "Pin"
@@ -94,7 +94,7 @@ class RISORIUS_OT_select_handle(_PointOperator, Operator):
 
     extend: bpy.props.BoolProperty(
         name="Extend",
-        description="Beside those that are selected; a selected one is taken out",
+        description="Add to the selection; a selected handle is deselected",
         options={"SKIP_SAVE"},
     )
 
@@ -115,7 +115,7 @@ class RISORIUS_OT_select_handle(_PointOperator, Operator):
 
 
 class _SelectedOperator(FaceOperator):
-    """What operators on the selected handles share."""
+    """Base of operators on the selected handles."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:

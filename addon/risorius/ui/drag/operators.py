@@ -40,7 +40,7 @@ class RISORIUS_OT_drag(Operator):
     )
     offset: bpy.props.FloatVectorProperty(
         name="Offset",
-        description="How far the point is dragged, in the scene's axes and units",
+        description="Displacement of the point in axes and units of the scene",
         size=3,
         subtype="TRANSLATION",
         options={"SKIP_SAVE"},
@@ -56,7 +56,7 @@ class RISORIUS_OT_drag(Operator):
     region: properties.region_property()
     single: bpy.props.BoolProperty(
         name="One Slider",
-        description="Only the slider that does it best moves",
+        description="Move only the best slider",
         options={"SKIP_SAVE"},
     )
     choice: bpy.props.IntProperty(
@@ -64,7 +64,7 @@ class RISORIUS_OT_drag(Operator):
     )
     with_selected: bpy.props.BoolProperty(
         name="Selected Handles",
-        description="All selected handles go the same way",
+        description="Move all selected handles in the same way",
         options={"SKIP_SAVE"},
     )
 
@@ -171,7 +171,7 @@ class RISORIUS_OT_drag(Operator):
         return {"FINISHED"}
 
     def _click(self, context: Context) -> None:
-        """A press that went nowhere selects: a handle, or what Blender finds there."""
+        """A press without motion selects a handle, or the object that Blender finds there."""
         point = {"mesh": self.mesh, "vertex": self.vertex if self._is_handle else -1}
         if self._is_handle or _selected(context, self._held.rig):
             bpy.ops.risorius.select_handle("EXEC_DEFAULT", True, **point)  # pyright: ignore  ours
@@ -220,7 +220,7 @@ class RISORIUS_OT_drag(Operator):
 
 
 def can_drag(cls: type[Operator]) -> bool:
-    """Poll: whether there is a face; says why when there is none. Args: cls  the operator."""
+    """Poll: whether a face exists; otherwise set the reason. Args: cls the operator."""
     if not usable(cls):
         return False
     if not parts.rigs():
@@ -238,7 +238,7 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[stroke.Point, ...]
 
 
 def _triangles(rig: ArmatureObject, mesh: int) -> NDArray[np.int32] | None:
-    """int32[T, 3] of a mesh, where it is as the DNA has it."""
+    """int32[T, 3] of a mesh, if it has the topology of the DNA file."""
     item = next((i for i in parts.meshes_of(rig) if i[parts.MESH] == mesh), None)
     live = runtime.of(rig)
     if item is None or live is None or len(item.data.vertices) != pointing.counts_of(live)[mesh]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The choices of a drag, behind the arrow beside its button."""
+"""The options of a drag, behind the arrow beside its button."""
 
 from ...scene.base import parts
 from ...scene.character import runtime

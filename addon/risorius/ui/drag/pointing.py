@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a press at the cursor would take, and what of a face is shown for that: handles and pins."""
+"""The point that a press at the cursor takes, and the drawn handles and pins."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def counts_of(live: runtime.Runtime) -> list[int]:
 
 
 def pick(context: Context, where: view.View, event: bpy.types.Event) -> picking.Hit | None:
-    """The point that a press would take: the nearest handle, else what lies under the cursor.
+    """The point that a press takes: the nearest handle, or the skin under the cursor.
 
     Args:
-        context: has the scene that is seen.
+        context: has the visible scene.
         where: the view under the cursor.
         event: has the cursor.
 
     Raises:
-        FaceError: the face is another file's, or has lost its DNA.
+        FaceError: the face is linked, or has lost its DNA.
     """
     mouse = where.mouse(event)
     hit = picking.under(context, *where.ray(mouse))

@@ -13,8 +13,10 @@ METHODS = (
     (
         "NEAR",
         "Near",
-        "Few sliders, of those that belong to this place: a brow turns no eye. "
-        "Where they do not reach, the point lags",
+        (
+            "Few sliders that belong to this place: a dragged brow turns no eye. The "
+            "point lags behind the pointer if they do not reach it"
+        ),
     ),
     (
         "LEAST_SQUARES",
@@ -24,7 +26,7 @@ METHODS = (
     (
         "TRANSPOSE",
         "Gentle",
-        "Only sliders that move this point, by as much as they do: it may lag, but surprises less",
+        "Only sliders that move this point well; the point may lag behind the pointer",
     ),
 )
 
@@ -33,14 +35,17 @@ def symmetric_property() -> object:
     """Of the choices and of each drag, as the two below."""
     return bpy.props.BoolProperty(
         name="Symmetric",
-        description="The point on the other side goes the mirrored way",
+        description="Mirror the drag on the other side of the face",
         options={"SKIP_SAVE"},
     )
 
 
 def method_property() -> object:
     return bpy.props.EnumProperty(
-        name="Method", description="How sliders are found", items=METHODS, options={"SKIP_SAVE"}
+        name="Method",
+        description="Method that finds the sliders",
+        items=METHODS,
+        options={"SKIP_SAVE"},
     )
 
 
@@ -58,13 +63,15 @@ class RISORIUS_PG_drag(bpy.types.PropertyGroup):
     region: region_property()
     handles: bpy.props.BoolProperty(
         name="Show Handles",
-        description="Some points where dragging reaches most; any other can be dragged as well",
+        description=(
+            "Show the points that dragging moves farthest; you can drag any other point too"
+        ),
         default=True,
         options={"SKIP_SAVE"},
     )
     heat: bpy.props.BoolProperty(
         name="Colour What Moves",
-        description="Colour the skin by how far it moves in a drag",
+        description="Colour the skin by its motion during a drag",
         default=True,
         options={"SKIP_SAVE"},
     )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tool of the 3D view's toolbar: while it is in the hand, each press on the skin is a drag.
+"""The tool of the 3D view's toolbar: while it is active, each press on the skin is a drag.
 
-Everything else of Blender goes on as it does. Handles and pins of the active face are drawn while
-the tool is the active one; what the pointer would take is drawn where it points.
+All other actions of Blender stay the same. While the tool is active, handles and pins of the active
+face are drawn, and the point under the pointer.
 """
 
 from typing import cast
@@ -54,8 +54,9 @@ class _Tool(WorkSpaceTool):
     bl_idname = IDNAME
     bl_label = "Drag the Face"
     bl_description = (
-        "Point at the skin and drag it. Ctrl: one slider, Tab the next; Shift click: pin, or "
-        "select handles, which go together; I keys and H hides those"
+        "Point at the skin and drag it. Ctrl: one slider, Tab: the next one; Shift-"
+        "click: pin, or select handles that move together; I keys handles, H hides "
+        "them"
     )
     bl_icon = "ops.pose.push"
     bl_widget = None
@@ -79,7 +80,7 @@ class DragInPoseMode(_Tool):
 
 
 class RISORIUS_OT_drag_tool(Operator):
-    """Take up the tool that drags the face by its skin, or put it down for the one before"""
+    """Activate the tool that drags the skin, or return to the earlier tool"""
 
     bl_idname = "risorius.drag_tool"
     bl_label = "Drag the Face"
@@ -133,14 +134,14 @@ def is_active(context: Context) -> bool:
 
 
 def _active(context: Context) -> str:
-    """The name of the active tool of 3D views in the mode of now; empty where there is none."""
+    """The name of the active tool of 3D views in the current mode; empty for none."""
     tools = context.workspace.tools
     tool = tools.from_space_view3d_mode(context.mode, create=False)  # pyright: ignore  the stub's
     return tool.idname if tool is not None else ""
 
 
 def _draw() -> None:
-    """Over each 3D view, while the tool is in the hand and nothing is dragged."""
+    """Draw over each 3D view while the tool is active and nothing is dragged."""
     context = cast(Context, bpy.context)
     space = context.space_data
     if drawing.is_drawing() or not is_active(context):
@@ -170,7 +171,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take it out again, and draw nothing any more."""
+    """Remove the tool and stop drawing."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
     for cls in (DragInPoseMode, DragInObjectMode):

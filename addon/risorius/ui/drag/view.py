@@ -33,7 +33,7 @@ class View:
         return view3d_utils.region_2d_to_origin_3d(self.region, self.data, pixel), direction
 
     def pixel(self, place: Float) -> Vector | None:
-        """Where a place of the world is seen, or None behind the viewer. Args: place  float64[3]"""
+        """The pixel of a place in the world, or None behind the viewer. Args: place float64[3]"""
         return view3d_utils.location_3d_to_region_2d(self.region, self.data, Vector(place.tolist()))
 
     def target(self, at: Vector, depth: Float) -> Float:

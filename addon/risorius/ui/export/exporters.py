@@ -35,7 +35,7 @@ Settings = dict[str, object]  # of one of Blender's exporters
 
 
 class ExportOperator(Protocol):
-    """What an exporter's settings depend on: properties of the operator."""
+    """Properties of the operator that exporter settings depend on."""
 
     format: str
     step: float
@@ -49,7 +49,7 @@ def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
         "use_active_scene": True,
         "export_animations": True,
         "export_animation_mode": "ACTIVE_ACTIONS",
-        # Else a lone armature gets every action of the file that moves bones of these names.
+        # Otherwise a single armature gets every action of the file with bones of these names.
         "export_anim_single_armature": False,
         "export_nla_strips_merged_animation_name": stage.objects[0].name,
         "export_frame_range": True,
@@ -115,7 +115,7 @@ def _alembic(_operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
     }
 
 
-# What Blender's exporter of each format is told; what a version does not know is left out.
+# Settings of Blender's exporter of each format; settings unknown to a version are left out.
 _SETTINGS = {"GLTF": _gltf, "FBX": _fbx, "USD": _usd, "ALEMBIC": _alembic}
 
 
@@ -142,12 +142,12 @@ def export(operator: ExportOperator, override: Override, path: Path) -> None:
     """Let Blender's own exporter of a format write a file.
 
     Args:
-        operator: has the format and the settings that the user chose.
+        operator: with the format and settings of the user.
         override: the context for the exporter, from export_animation.copies.
-        path: of the file, in a folder that is there for this export alone.
+        path: of the file, in a folder for this export only.
 
     Raises:
-        FaceError: the exporter says what it cannot, wrote nothing, or a part of the file.
+        FaceError: the exporter reports an error, wrote nothing, or wrote a part of the file.
     """
     group, name = _OPERATORS[operator.format]
     function = getattr(getattr(bpy.ops, group), name)

@@ -43,8 +43,10 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
     lod: bpy.props.IntProperty(name="LOD", description="Level of detail", min=0, max=15)
     megabytes: bpy.props.FloatProperty(
         name="Megabytes",
-        description="What the file may have: textures, vertices and levels become smaller until "
-        "it fits. 0: any size",
+        description=(
+            "Largest size of the file in megabytes; textures, vertices and "
+            "levels are reduced until it fits. 0: no limit"
+        ),
         min=0.0,
         max=1000.0,
     )
@@ -52,15 +54,17 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
         name="Skeleton", description="Joints of neck, head, jaw and eyes", default=True
     )
     use_quantize: bpy.props.BoolProperty(
-        name="Quantize", description="Vertices of 16 bits, which most programs read"
+        name="Quantize", description="Store vertices with 16 bits; most programs read this"
     )
     use_meshopt: bpy.props.BoolProperty(
-        name="Compress", description="Packed by meshoptimizer, which not every program reads"
+        name="Compress", description="Compress with meshoptimizer; not every program reads this"
     )
     use_combinations: bpy.props.BoolProperty(
         name="Combinations",
-        description="Targets for what others lack where they are on together, with a script that "
-        "drives them in a browser",
+        description=(
+            "Add targets that correct combinations of others, and a script "
+            "that drives them in a browser"
+        ),
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:

@@ -12,10 +12,10 @@ from ..words import say
 
 
 def before_gltf(settings: Mapping[str, object]) -> None:
-    """Warn of live faces in a glTF of Blender's own; the exporter calls this before it writes.
+    """Warn about live faces in Blender's own glTF export; the exporter calls this before writing.
 
     Args:
-        settings: the exporter's, of which only the log and what is exported are read.
+        settings: settings of the exporter; its log and the choice of objects are used.
     """
     warning = getattr(settings.get("log"), "warning", None)
     found = live_faces(bool(settings.get("gltf_active_scene")), bool(settings.get("gltf_selected")))
@@ -32,11 +32,11 @@ def before_gltf(settings: Mapping[str, object]) -> None:
 
 
 def live_faces(active_scene: bool, selected: bool) -> list[str]:
-    """The names of the faces that an export would show at rest: those that are not baked.
+    """The names of unbaked faces, which an export would show at rest.
 
     Args:
         active_scene: only the scene of the context is exported.
-        selected: only what is selected there.
+        selected: only selected objects of it.
     """
     here = current_context()
     scenes = [here.scene] if active_scene else bpy.data.scenes

@@ -62,20 +62,21 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     all_shapes: bpy.props.BoolProperty(
         name="All Shapes",
-        description="Write also shape keys that this range does not use",
+        description="Include shape keys that this range does not use",
         default=False,
     )
     influences: bpy.props.IntProperty(
         name="Influences",
-        description="Joints that move a vertex. Engines take 4 or 8; 0 writes all, which is what "
-        "Blender shows",
+        description=(
+            "Most joints of a vertex. Engines take 4 or 8; 0 writes all, as Blender shows them"
+        ),
         default=0,
         min=0,
         max=32,
     )
     fbx_units: bpy.props.EnumProperty(
         name="Units",
-        description="Where an FBX file says that a Blender unit is a metre",
+        description="Place in the FBX file that stores the unit",
         items=(
             ("FBX_SCALE_NONE", "On Objects", "Objects are scaled by 100: as Unreal expects it"),
             ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
@@ -97,7 +98,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
     )
     maps: bpy.props.BoolProperty(
         name="With Maps",
-        description="Write also the values of the animated maps, which no other format can hold",
+        description="Include the values of animated maps",
         default=False,
     )
 
@@ -197,11 +198,11 @@ def run(context: Context, job: Generator[float, None, _T]) -> _T:
     """Run a generator to its end, with progress.
 
     Args:
-        context: whose window shows it.
-        job: yields the share that is done, 0 to 1.
+        context: with the window for the progress.
+        job: yields the finished share, 0 to 1.
 
     Returns:
-        What it returns.
+        The return value of the generator.
     """
     with shown_progress(context) as progress:
         try:
@@ -217,7 +218,7 @@ def _write_csv(clip: "native.Clip", path: Path) -> None:
 
 
 def _one_sentence(path: str, error: Exception) -> str:
-    """What went wrong; of an exporter's traceback only the last line."""
+    """The sentence of an error; of an exporter's traceback only the last line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     useful = [x for x in lines if not x.startswith(("Location:", "File ", "Traceback"))]
     text = (useful or ["it failed without a word"])[-1].removeprefix("Error: ").rstrip(".")

@@ -33,11 +33,11 @@ class RISORIUS_OT_export_web(FrameRange, FaceOperator, ExportHelper, Operator):
     filename_ext = ".html"
     filter_glob: bpy.props.StringProperty(default="*.html", options={"HIDDEN"})
     use_animation: bpy.props.BoolProperty(
-        name="Animation", description="The page plays what the controls do", default=True
+        name="Animation", description="Include the animation of the controls", default=True
     )
     use_sound: bpy.props.BoolProperty(
         name="Sound",
-        description="The sound strip that is heard first comes along",
+        description="Include the first sound strip",
         default=True,
     )
 

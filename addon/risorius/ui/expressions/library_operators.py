@@ -28,7 +28,7 @@ _AT_ONCE = 3  # pictures after which the sidebar is drawn again
 
 
 def redraw(context: Context) -> None:
-    """Show new pictures: the sidebars of all windows are drawn again, and nothing else."""
+    """Show new pictures by redrawing the sidebars of all windows."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions if area.type == "VIEW_3D" else ():
@@ -45,7 +45,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
     baked_too = True
 
     again: bpy.props.BoolProperty(
-        name="All Anew", description="Also pictures that are there", options={"SKIP_SAVE"}
+        name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -110,7 +110,7 @@ class RISORIUS_OT_render_thumbnails(RunsBeside, FaceOperator, Operator):
 
 
 class _LibraryOperator(FaceOperator):
-    """What operators on expressions of one's own share: one sentence for what goes wrong."""
+    """Base of operators on the user's expressions; they report an error as one sentence."""
 
     def execute(self, context: Context) -> Result:
         try:
@@ -124,7 +124,7 @@ class _LibraryOperator(FaceOperator):
         return {"FINISHED"}
 
     def work(self, context: Context) -> None:
-        """Do it. Raises: what a user can mend."""
+        """Do the work. Raises: errors that a user can repair."""
         raise NotImplementedError
 
 
@@ -135,8 +135,8 @@ def _put(
     shared: bool,
     over: Path | None = None,
 ) -> None:
-    """An expression of one's own as a pose asset of this file, and in the library, there in the
-    place of a file or in one of its own."""
+    """Store the user's expression as a pose asset of this file, and in the library in a new file or
+    instead of a file."""
     picture = assets.picture_of(rig, expression)
     sitter = None if picture.is_file() else thumbnails.sitter_of(rig)
     if sitter is not None:
@@ -149,7 +149,7 @@ def _put(
 
 
 class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
-    """Save what the face shows as an expression: a pose asset, and for other files if chosen"""
+    """Save the current pose as an expression: an asset of this file, or a file of the library"""
 
     bl_idname = "risorius.save_expression"
     bl_label = "Save Expression"
@@ -162,13 +162,13 @@ class RISORIUS_OT_save_expression(_LibraryOperator, Operator):
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="What it holds; none for all regions that are not at rest",
+        description="Regions to save; choose none for all regions that are not at rest",
         items=region_items,
         options={"ENUM_FLAG", "SKIP_SAVE"},
     )
     shared: bpy.props.EnumProperty(
         name="Shared Library",
-        description="Whether it is saved for all files as well",
+        description="Save it in the library for all files too",
         items=(
             ("PANEL", "As in the Panel", ""),
             ("YES", "In the Library", ""),
@@ -214,7 +214,7 @@ class _OfOne(_LibraryOperator):
 
 
 class RISORIUS_OT_update_expression(_OfOne, Operator):
-    """Give an expression of one's own what the face shows now"""
+    """Replace the pose of your own expression by the current pose"""
 
     bl_idname = "risorius.update_expression"
     bl_label = "Update Expression"
@@ -231,7 +231,7 @@ class RISORIUS_OT_update_expression(_OfOne, Operator):
 
 
 class RISORIUS_OT_rename_expression(_OfOne, Operator):
-    """Give an expression of one's own another name or category"""
+    """Change the name or category of your own expression"""
 
     bl_idname = "risorius.rename_expression"
     bl_label = "Rename Expression"
@@ -273,7 +273,7 @@ class RISORIUS_OT_rename_expression(_OfOne, Operator):
 
 
 class RISORIUS_OT_delete_expression(_OfOne, Operator):
-    """Delete an expression of one's own, here and in the library"""
+    """Delete your own expression, in this file and in the library"""
 
     bl_idname = "risorius.delete_expression"
     bl_label = "Delete Expression"
@@ -302,13 +302,13 @@ class RISORIUS_OT_star_expression(_OfOne, Operator):
 
 
 class _OfFolder(_LibraryOperator, OperatorBase):
-    """On a folder that the user chooses; asks before it writes over what is the user's."""
+    """Base of operators on a folder; they ask before they replace files of the user."""
 
     directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH")
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     replace: bpy.props.BoolProperty(
         name="Replace",
-        description="Write over expressions of yours that have the same names",
+        description="Replace your own expressions that have the same names",
         options={"SKIP_SAVE"},
     )
     asked: bpy.props.StringProperty(options={"HIDDEN", "SKIP_SAVE"})
@@ -347,7 +347,7 @@ class _OfFolder(_LibraryOperator, OperatorBase):
 
 
 class RISORIUS_OT_export_expressions(_OfFolder, Operator):
-    """Write one's own expressions into a folder, one TOML file and one picture each"""
+    """Write your own expressions into a folder, each as a TOML file and a picture"""
 
     bl_idname = "risorius.export_expressions"
     bl_label = "Export Expressions"
@@ -378,7 +378,7 @@ class RISORIUS_OT_export_expressions(_OfFolder, Operator):
 
 
 class RISORIUS_OT_import_expressions(_OfFolder, Operator):
-    """Take the expressions of a folder into the library, all or none"""
+    """Import all expressions of a folder into the library"""
 
     bl_idname = "risorius.import_expressions"
     bl_label = "Import Expressions"

@@ -15,9 +15,10 @@ def expression_menu(group: str, title: str, operator: str) -> type[Menu]:
     """A menu with one entry per expression of a group.
 
     Args:
-        group: "emotion", "viseme" and the like, of the expressions that are listed.
+        group: group of the listed expressions, such as "emotion" or "viseme".
         title: of the menu.
-        operator: bl_idname of what an entry calls: to set the expression, or to add it as a layer.
+        operator: bl_idname of the operator of an entry: it sets the expression, or adds it as a
+            layer.
 
     Returns:
         The class, to be registered.

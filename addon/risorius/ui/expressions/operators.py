@@ -25,20 +25,20 @@ _MOST = 1.0
 
 
 class Mixes(HandOperator):
-    """The properties that say how an expression is mixed in."""
+    """The properties of blending an expression."""
 
     expression: bpy.props.StringProperty(name="Expression")
     strength: bpy.props.FloatProperty(
         name="Strength", default=1.0, min=0.0, max=_MOST, subtype="FACTOR"
     )
     only: bpy.props.BoolProperty(name="Rest of the Face at Rest", default=True)
-    flip: bpy.props.BoolProperty(name="Flip", description="Left for right")
+    flip: bpy.props.BoolProperty(name="Flip", description="Swap left and right")
     additive: bpy.props.BoolProperty(
-        name="Additive", description="Add to what the face does; nothing goes to rest"
+        name="Additive", description="Add the expression to the current pose"
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Only these regions are moved; none for all",
+        description="Move only these regions; choose none for all",
         items=region_items,
         options={"ENUM_FLAG"},
     )
@@ -89,7 +89,7 @@ class Applies(Mixes):
 
         Args:
             context: of the operator.
-            event: tells which keys are held.
+            event: has the held keys.
         """
         # Ctrl flips in Blender's pose library too.
         self.flip, self.additive = self.flip != event.ctrl, self.additive != event.shift
@@ -106,7 +106,7 @@ class Blends(Mixes):
 
         Args:
             context: of the operator.
-            event: tells where the mouse is.
+            event: has the place of the mouse.
         """
         rig = face_rig(context)
         try:
@@ -126,13 +126,13 @@ class Blends(Mixes):
 
         Args:
             context: of the operator.
-            event: each that Blender has meanwhile.
+            event: the current event.
         """
         if event.type in {"ESC", "RIGHTMOUSE"}:
             self.cancel(context)
             return {"CANCELLED"}
         if event.type in {"LEFTMOUSE", "RET", "NUMPAD_ENTER"}:
-            # A press where one has clicked before, the release of one who drags.
+            # Accept on a press after a click, or on the release after a drag.
             context.workspace.status_text_set(None)
             return self.execute(context)
         if event.type == "MOUSEMOVE":
@@ -149,7 +149,7 @@ class Blends(Mixes):
         return {"RUNNING_MODAL"}
 
     def _follow(self, context: Context) -> None:
-        """Show the blend, or with Tab what was before."""
+        """Show the blend, or with Tab the pose before."""
         rig = face_rig(context)
         sides.restore(rig, self._held)
         if self._shown:
@@ -179,7 +179,7 @@ class Blends(Mixes):
 
 # Blender loses a registered class that another one is derived from: the shelf's have bases too.
 class RISORIUS_OT_expression(Applies, Operator):
-    """Move the sliders to an expression. Ctrl: left for right, Shift: added to the face"""
+    """Move the sliders to an expression. Ctrl: swap left and right, Shift: add to the pose"""
 
     bl_idname = "risorius.expression"
     bl_label = "Expression"

@@ -17,7 +17,7 @@ from .menus import RISORIUS_MT_expressions
 from .properties import ALL, STARRED, RISORIUS_PG_expressions, choices, remember_categories
 
 _ICON = 20.0  # pixels of an icon, and of the picture for each unit of its size
-# Looks of characters whose pictures were begun by themselves.
+# Looks of characters whose pictures were started automatically.
 _asked: set[str] = session.keep("expressions.panel.asked", set, ("unregister",))
 
 
@@ -71,13 +71,13 @@ def _draw_tools(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
 
 
 def _chosen(items: list[library.Item], chosen: RISORIUS_PG_expressions) -> list[library.Item]:
-    """What is shown: of the category, with the words of the search."""
+    """The shown expressions: of the category, with the words of the search."""
     sought, group = chosen.search.lower().split(), chosen.category
     starred = library.favourites() if group == STARRED else set()
     found = []
     for item in items:
         expression = item.expression
-        # By its name too, which is a library's: PP of M B P.
+        # Search the name too, such as PP of M B P.
         named = f"{expression.name} {expression.label} {words.say(expression.label)}"
         text = f"{named} {expression.description}".lower()
         fits = group in (ALL, expression.group) or expression.name in starred
@@ -124,7 +124,7 @@ def _draw_grid(
 
 
 def _draw_one(layout: UILayout, item: library.Item) -> None:
-    """What can be done with the expression that was clicked last."""
+    """Draw the actions for the last clicked expression."""
     expression, own = item.expression, item.source != library.RISORIUS
     box = layout.box()
     row = box.row(align=True)
@@ -141,7 +141,7 @@ def _draw_one(layout: UILayout, item: library.Item) -> None:
 
 
 def _draw_own(layout: UILayout, chosen: RISORIUS_PG_expressions) -> None:
-    """Saving what the face shows."""
+    """Draw the row for saving the current pose."""
     column = layout.column(align=True)
     row = column.row(align=True)
     row.prop(chosen, "new_label", text="")

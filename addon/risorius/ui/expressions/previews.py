@@ -13,7 +13,7 @@ from ...scene.character import runtime
 from ...scene.expressions import poses, thumbnails
 from ...scene.expressions.library import Item
 
-# "icons": Blender's collection of them.
+# "icons": Blender's preview collection.
 _held: dict[str, Any] = session.table("previews.held", ("unregister",))
 
 
@@ -29,7 +29,7 @@ def icon_of(path: Path) -> int:
 
 
 def load(path: Path) -> int:
-    """icon_of with the picture read now: a list that one searches does not wait for it.
+    """icon_of that reads the picture at once, for search lists.
 
     Args:
         path: of the picture.
@@ -41,7 +41,7 @@ def load(path: Path) -> int:
 
 
 def forget() -> None:
-    """Drop all icons: at the end, and where pictures are made anew."""
+    """Drop all icons, at the end and before pictures are drawn again."""
     if _held:
         bpy.utils.previews.remove(_held.pop("icons"))
 

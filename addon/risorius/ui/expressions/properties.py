@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""How the grid of expressions is shown and what a click does; it goes with the window."""
+"""Settings of the grid of expressions and of a click, stored with the window."""
 
 from typing import cast
 
@@ -29,14 +29,14 @@ def region_items(_self: object, _context: object) -> list[tuple[str, str, str, i
 
 
 def remember_categories(groups: list[str]) -> None:
-    """Let the categories that there are be chosen.
+    """Offer the existing categories.
 
     Args:
         groups: of expressions, in their order.
     """
     named = {"emotion": say("Emotions"), "face": say("Faces"), "viseme": say("Visemes")}
     items = [(ALL, say("All"), say("All expressions"))]
-    items.append((STARRED, say("Favourites"), say("Those with a star")))
+    items.append((STARRED, say("Favourites"), say("Expressions with a star")))
     items += [(group, named.get(group, group), "") for group in groups if group]
     if items != _known.get("categories"):
         _known["categories"] = items
@@ -49,7 +49,7 @@ def _categories(_self: object, _context: object) -> list[Item]:
 
 
 class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
-    """What the user chose."""
+    """The user's settings."""
 
     search: bpy.props.StringProperty(
         name="Search",
@@ -57,53 +57,53 @@ class RISORIUS_PG_expressions(bpy.types.PropertyGroup):
         options={"TEXTEDIT_UPDATE", "SKIP_SAVE"},
     )
     category: bpy.props.EnumProperty(
-        name="Category", description="Which expressions are shown", items=_categories
+        name="Category", description="Expressions to show", items=_categories
     )
     size: bpy.props.FloatProperty(
-        name="Size", description="Of the pictures", default=5.0, min=2.0, max=12.0
+        name="Size", description="Size of the pictures", default=5.0, min=2.0, max=12.0
     )
     strength: bpy.props.FloatProperty(
         name="Strength",
-        description="How much of the expression a click sets",
+        description="Strength of the expression that a click sets",
         default=1.0,
         min=0.0,
         max=1.0,
         subtype="FACTOR",
     )
     flip: bpy.props.BoolProperty(
-        name="Flip", description="Left for right; also a click with Ctrl held"
+        name="Flip", description="Swap left and right; a Ctrl-click does the same"
     )
     additive: bpy.props.BoolProperty(
         name="Additive",
-        description="Add to what the face does; also a click with Shift held",
+        description="Add the expression to the current pose; a Shift-click does the same",
     )
     only: bpy.props.BoolProperty(
         name="Rest of the Face at Rest",
-        description="Sliders that the expression does not move go to rest",
+        description="Set sliders to 0 that the expression does not move",
         default=True,
     )
     regions: bpy.props.EnumProperty(
         name="Regions",
-        description="Only these regions are moved; none for all",
+        description="Move only these regions; choose none for all",
         items=region_items,
         options={"ENUM_FLAG"},
     )
     active: bpy.props.StringProperty(name="Expression")
     new_label: bpy.props.StringProperty(
-        name="Name", description="Of the expression that is saved; empty for a number"
+        name="Name", description="Name of the new expression; empty: a number"
     )
     new_group: bpy.props.StringProperty(
-        name="Category", description="Of the expression that is saved", default="own"
+        name="Category", description="Category of the new expression", default="own"
     )
     to_library: bpy.props.BoolProperty(
         name="Shared Library",
-        description="Save it for all files as well, in the folder of the preferences",
+        description="Save it for all files too, in the folder of the preferences",
         default=True,
     )
 
 
 def choices(context: Context) -> RISORIUS_PG_expressions:
-    """What the user chose.
+    """The user's settings.
 
     Args:
         context: Blender context.

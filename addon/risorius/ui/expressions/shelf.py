@@ -4,7 +4,7 @@
 """Expressions on Blender's asset shelf, with our operators where a shelf takes any.
 
 Blender's own pose shelf applies the same assets, in pose mode and to the bones that are selected;
-ours moves the sliders whatever is selected, in object mode too.
+this shelf moves the sliders with any selection, also in object mode.
 """
 
 from typing import Any
@@ -56,7 +56,7 @@ class _OfAsset(OperatorBase):
 
 
 class RISORIUS_OT_apply_pose_asset(_OfAsset, Applies, Operator):
-    """Move the sliders to the expression of a pose asset. Ctrl: left for right, Shift: added"""
+    """Move the sliders to the expression of a pose asset. Ctrl: swap sides, Shift: add"""
 
     bl_idname = "risorius.apply_pose_asset"
     bl_label = "Expression"
@@ -90,7 +90,7 @@ class RISORIUS_AST_expressions(bpy.types.AssetShelf):
 
 
 def takes_operators() -> bool:
-    """Whether this Blender's shelves take operators of one's own: since 4.3."""
+    """Whether the shelves of this Blender accept own operators: since 4.3."""
     return "bl_activate_operator" in bpy.types.AssetShelf.bl_rna.properties
 
 

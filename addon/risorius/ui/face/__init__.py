@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A face that is there: controls, level of detail, shapes, body, overdrive."""
+"""An existing face: controls, level of detail, shapes, body, overdrive."""
 
 from . import (
     body_operators,

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The line at the top of the tab: whose face it is, or the mode that is on, with what ends it.
+"""The line at the top of the tab: the name of the face, or the active mode with a button that ends
+it.
 
-It is one line in every mode, so that nothing below it moves.
+It is one line in every mode, so that the panels below stay in place.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,14 +26,14 @@ _TEXT = 0.72  # of the line; what is left has the button
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode that a face can be in, in which the same hand does something else.
+    """A mode of a face in which edits have another effect.
 
     Attributes:
         text: its name, in the user's language.
-        icon: before it.
-        operator: what ends it.
-        settings: properties of that.
-        alert: whether the face is not seen, or not keyed, as one may think.
+        icon: icon before the text.
+        operator: operator that ends the mode.
+        settings: properties of the operator.
+        alert: True: warn, because the view or the keys of the face are not as usual.
     """
 
     text: str
@@ -53,7 +54,7 @@ def modes(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> li
 
 
 def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """What says where edits and keys go."""
+    """Modes that change the target of edits and keys."""
     session = sessions.of(controls)
     if session is not None and session.recording is not None:
         yield Mode(words.say("Recording"), "REC", "risorius.live_record", alert=True)
@@ -73,7 +74,7 @@ def _of_keys(context: Context, rig: ArmatureObject, controls: ArmatureObject) ->
 
 
 def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -> Iterator[Mode]:
-    """What says how the face is shown, and which sliders go together."""
+    """Modes that change the view of the face or link sliders."""
     look = look_masks.of(rig)
     if look.solo:
         swapped = as_seen(context)
@@ -92,11 +93,11 @@ def _of_looks(context: Context, rig: ArmatureObject, controls: ArmatureObject) -
 
 
 def draw(layout: UILayout, context: Context, rig: ArmatureObject, controls: ArmatureObject) -> None:
-    """The line.
+    """Draw the line.
 
     Args:
         layout: of the panel.
-        context: of it.
+        context: of the panel.
         rig, controls: the armatures of the face.
     """
     found = modes(context, rig, controls)

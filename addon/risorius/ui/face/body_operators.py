@@ -28,20 +28,28 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
 
     body: bpy.props.StringProperty(name="Body", description="The body's armature")
     base: bpy.props.StringProperty(
-        name="Base", description="The bone that carries the whole face; empty finds it"
+        name="Base", description="Bone that carries the whole face; empty: find it by name"
     )
     neck: bpy.props.StringProperty(
-        name="Neck", description="The bone that turns the face's neck; empty finds it"
+        name="Neck", description="Bone that turns the neck of the face; empty: find it by name"
     )
     head: bpy.props.StringProperty(
-        name="Head", description="The bone that turns the face's head; empty finds it"
+        name="Head", description="Bone that turns the head of the face; empty: find it by name"
     )
     fit: bpy.props.EnumProperty(
         name="Place",
         items=(
-            ("MOVE", "On the Head", "Put the face's head joint on the body's"),
-            ("SCALE", "On the Head, to Size", "The same, and as large as the body's neck is long"),
-            ("NONE", "Where It Is", "Leave the face where it stands"),
+            (
+                "MOVE",
+                "On the Head",
+                ("Move the face so that its head joint meets the head bone of the body"),
+            ),
+            (
+                "SCALE",
+                "On the Head, to Size",
+                ("The same, and scale the face to the length of the body's neck"),
+            ),
+            ("NONE", "Where It Is", "Keep the place of the face"),
         ),
     )
 
@@ -98,7 +106,7 @@ class RISORIUS_OT_attach_body(FaceOperator, Operator):
 
 
 class RISORIUS_OT_detach_body(FaceOperator, Operator):
-    """Take the face off its body; it stays where it stands"""
+    """Detach the face from its body; it keeps its place"""
 
     bl_idname = "risorius.detach_body"
     bl_label = "Detach from Body"

@@ -46,7 +46,7 @@ def _channels(_operator: object, context: bpy.types.Context | None) -> list[Item
 
 
 class RISORIUS_OT_test_channel(FaceOperator, Operator):
-    """Show one blend shape at a weight of your own; it ends with the next frame, edit or save"""
+    """Show one blend shape with a weight of your choice until the next frame, edit or save"""
 
     bl_idname = "risorius.test_channel"
     bl_label = "Test a Shape"
@@ -55,13 +55,13 @@ class RISORIUS_OT_test_channel(FaceOperator, Operator):
 
     channel: bpy.props.EnumProperty(
         name="Shape",
-        description="The blend shape that is tried",
+        description="Blend shape to test",
         items=_channels,
         translation_context=NAMES,
     )
     value: bpy.props.FloatProperty(
         name="Weight",
-        description="Its weight while it is tried",
+        description="Weight of the tested shape",
         default=1.0,
         min=-10.0,
         max=10.0,
@@ -104,11 +104,11 @@ def _set_weight(_manager: bpy.types.WindowManager, value: float) -> None:
 
 
 def weight_property() -> object:
-    """The slider: it shows and sets the override of the active face, and keeps nothing."""
+    """The slider property: it shows and sets the override of the active face and stores nothing."""
     return bpy.props.FloatProperty(
         name="Weight",
         translation_context=CONTEXT,
-        description="Weight of the shape that is tried",
+        description="Weight of the tested shape",
         soft_min=0.0,
         soft_max=1.0,
         get=_get_weight,

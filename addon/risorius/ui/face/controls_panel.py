@@ -70,7 +70,7 @@ class RISORIUS_PT_controls(FaceOnlyPanel, Panel):
             words.write(layout, nothing, "INFO")
 
 
-# A panel is drawn again with every frame that plays: what is in it is sorted once.
+# Panels are redrawn with every played frame, so their content is sorted once.
 @session.cached(("unregister",), 8)
 def _regions(shown: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     groups = slider_words.group_controls(shown, native.regions())
@@ -142,19 +142,19 @@ def draw_sliders(
     followers: Mapping[str, str],
     given: Mapping[str, float],
 ) -> None:
-    """One line per control; both its sides share it, a long name stands above.
+    """Draw one line for each control; both sides share it, and a long name stands above.
 
-    Of two sides that are linked the one that leads is shown. What the board gives is shown as it
-    is: a slider that does nothing is none.
+    Of two linked sides the leading one is drawn. Values from the board are drawn as bars, because
+    their sliders have no effect.
 
     Args:
         context: of the panel.
         layout: of the panel.
-        face: the bone that bears the sliders.
-        region: what stands above them.
+        face: the bone with the sliders.
+        region: their region.
         names: the sliders.
-        followers: those that follow another one, with the one that leads.
-        given: what the face board gives, by the names of its sliders.
+        followers: following slider -> leading slider.
+        given: values from the face board by slider names.
     """
     part = _Part(context, face, region, names, followers, given)
     first, more = part.lines()
@@ -162,7 +162,7 @@ def draw_sliders(
 
 
 def _draw_parted(layout: UILayout, part: _Part, rests: Mapping[str, float]) -> None:
-    """The sliders that are used most, the others behind More, with how many of them are moved."""
+    """Draw the most used sliders, and the others under More with the number of moved ones."""
     first, more = part.lines()
     _draw_lines(layout, part, first)
     if not more:
@@ -204,7 +204,8 @@ def _draw_lines(layout: UILayout, part: _Part, lines: Sequence[slider_rows.Row])
 
 
 def _draw_sides(column: UILayout, linked: bool) -> None:
-    """What the columns of sliders are: a slider is too narrow for a letter before its number."""
+    """Draw headings of the columns, because a slider is too narrow for a letter before its
+    number."""
     row = column.split(factor=_TITLE, align=True)
     row.label(text="")
     row = row.row(align=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Favourites above the controls, and what the menu of a slider offers."""
+"""The panel Favourites above the controls, and entries of a slider's context menu."""
 
 from ... import native
 from ...scene.base import parts
@@ -32,7 +32,7 @@ class RISORIUS_PT_favourites(FaceOnlyPanel, Panel):
 
 
 def draw_button_menu(self: Menu, context: Context) -> None:
-    """Entries of the menu of a slider's button. Args: self  the menu, context  of it."""
+    """Entries of a slider's context menu. Args: self the menu, context of it."""
     name = control_under_mouse(context) if active_controls(context) is not None else ""
     if not name:
         return

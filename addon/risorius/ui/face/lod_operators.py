@@ -32,7 +32,7 @@ class RISORIUS_OT_set_lod(FaceOperator, Operator):
         name="Where",
         items=(
             ("BOTH", "Everywhere", "In the viewport, and renders follow it"),
-            ("VIEWPORT", "Viewport", "In the viewport; renders keep a level of their own"),
+            ("VIEWPORT", "Viewport", "In the viewport; renders keep their own level"),
             ("RENDER", "Render", "In renders only"),
         ),
         options={"SKIP_SAVE"},

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators on a face that is there: reset, keys, level of detail, shapes, overdrive."""
+"""Operators on an existing face: reset, keys, level of detail, shapes, overdrive."""
 
 from collections.abc import Collection
 
@@ -91,9 +91,7 @@ class RISORIUS_OT_set_shape_mode(FaceOperator, Operator):
     bl_idname = "risorius.set_shape_mode"
     bl_label = "Shapes"
 
-    mode: bpy.props.EnumProperty(
-        name="Shapes", description="How blend shapes are kept", items=MODES
-    )
+    mode: bpy.props.EnumProperty(name="Shapes", description="Mode of the blend shapes", items=MODES)
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
@@ -147,7 +145,7 @@ class RISORIUS_OT_prepare_for_export(FaceOperator, Operator):
 
 
 class RISORIUS_OT_set_overdrive(FaceOperator, Operator):
-    """Let the controls of this face go up to 1.5"""
+    """Allow values of the controls up to 1.5"""
 
     bl_idname = "risorius.set_overdrive"
     bl_label = "Overdrive"

@@ -27,7 +27,7 @@ class RISORIUS_PT_character(FacePanel, Panel):
     bl_order = 0
 
     def draw_header_preset(self, context: Context) -> None:
-        """Whose face it is, where the banner says something else or there are several."""
+        """Draw the name of the face, if the banner shows a mode or the scene has several faces."""
         rig, controls = parts.active_rig(context), active_controls(context)
         if rig is None or controls is None:
             return
@@ -43,7 +43,7 @@ class RISORIUS_PT_character(FacePanel, Panel):
         if draw_trouble(layout, context):
             return
         rig = parts.active_rig(context)
-        # Before what one does with a face: the selected mesh is none yet.
+        # Offer this first: the selected mesh is no face yet.
         if parts.rig_of(context.object) is None and shape_key_head.head_of(context) is not None:
             layout.operator("risorius.make_rig", icon="SHAPEKEY_DATA")
         if rig is None:
@@ -65,7 +65,8 @@ class RISORIUS_PT_character(FacePanel, Panel):
 
 
 def _draw_start(layout: UILayout) -> None:
-    """What one does first. Buttons of later steps are grey and say in their tooltip what lacks."""
+    """Draw the first steps. Buttons of later steps are grey, and their tooltips name the missing
+    step."""
     if any(parts.rigs()):
         words.write(layout, "No face is selected: click on one.", "INFO")
     _draw_step(layout, words.say("1. Get a face"))
@@ -86,7 +87,7 @@ def _draw_step(layout: UILayout, text: str) -> None:
 
 
 def _draw_hint(layout: UILayout, context: Context) -> None:
-    """What to do with a face, until a click says that it was read: sliders leave it alone."""
+    """Draw hints for a new face until the user hides them."""
     addon = context.preferences.addons.get(native.ADDON)
     if addon is not None and not getattr(addon.preferences, "hints", True):
         return
@@ -108,7 +109,7 @@ def _draw_detail(layout: UILayout, rig: ArmatureObject) -> None:
         ("VIEWPORT", "Detail in the Viewport", lods.viewport_level(rig)),
         ("RENDER", "Detail in Renders", lods.render_level(rig)),
     ):
-        # On a line of its own: beside eight levels there is no room for words.
+        # Use a line of its own, because eight levels leave no room for words.
         column.label(text=text, text_ctxt=words.CONTEXT)
         row = column.row(align=True)
         row.active = not auto

@@ -3,9 +3,9 @@
 # pyright: reportInvalidTypeForm=false
 """Blender's Paste Pose Flipped on the controls of a face.
 
-Blender turns bones over by the L and R of their names; sliders are properties of one bone, which it
-pastes as they are. So its command is followed by a step that puts them left for right: as an
-operator in its place on the same keys, and where Blender's own was called from a menu, once more.
+Blender swaps bones by L and R in their names. Sliders are properties of one bone, which it pastes
+unchanged. So a second step swaps the sliders: an operator replaces Blender's on the same keys, and
+a call of Blender's own from a menu is repeated with it.
 """
 
 from collections.abc import Collection
@@ -32,19 +32,19 @@ _seen: dict[str, object] = session.table("paste_flipped.seen", ("unregister",))
 
 
 def _posed_controls(context: Context) -> ArmatureObject | None:
-    """The controls of the active face where they are what is posed."""
+    """The controls of the active face, if they are in pose mode."""
     controls = active_controls(context)
     return controls if controls is not None and context.pose_object == controls else None
 
 
 class RISORIUS_OT_paste_pose_flipped(HandOperator, Operator):
-    """Paste the copied pose left for right, with the sliders of the face"""
+    """Paste the copied pose with left and right swapped, with the sliders of the face"""
 
     bl_idname = "risorius.paste_pose_flipped"
     bl_label = "Paste Pose Flipped, with Sliders"
 
     selected: bpy.props.BoolProperty(
-        name="On Selected Only", description="Only onto bones that are selected", default=False
+        name="On Selected Only", description="Only onto selected bones", default=False
     )
 
     @classmethod
@@ -89,7 +89,7 @@ def _is_mark(value: float) -> bool:
 
 
 def _draw(self: Menu, context: Context) -> None:
-    """Entry of the menu Pose, beside Blender's."""
+    """Entry of the menu Pose beside Blender's own."""
     if _posed_controls(context) is not None:
         self.layout.separator()
         self.layout.operator("risorius.copy_pose", icon="COPYDOWN")
@@ -132,7 +132,7 @@ def _posing_window(manager: bpy.types.WindowManager) -> bpy.types.Window | None:
 
 
 def _once_more() -> None:
-    """Take Blender's step back and do ours, so that one undo takes back all of it."""
+    """Undo Blender's step and run ours, so that one undo takes back both."""
     context = current_context()
     window = _posing_window(context.window_manager)
     if window is None:
@@ -147,7 +147,7 @@ def _once_more() -> None:
 
 
 def register() -> None:
-    """Add the entry of the menu, the keys and what notices Blender's own command."""
+    """Add the menu entry, the keys, and the listener for Blender's own command."""
     bpy.types.VIEW3D_MT_pose.append(_draw)
     bpy.app.handlers.depsgraph_update_post.append(_updated)
     config = current_context().window_manager.keyconfigs.addon

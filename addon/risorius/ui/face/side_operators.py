@@ -30,7 +30,7 @@ def _only_region() -> object:
 def _from_left() -> object:
     return bpy.props.BoolProperty(
         name="From the Character's Left",
-        description="The character's own left side is the one that is copied; off: its right",
+        description="Copy the left side of the character; off: its right side",
         default=True,
         options={"SKIP_SAVE"},
     )
@@ -51,7 +51,7 @@ class RISORIUS_OT_mirror(HandOperator, Operator):
 
 
 class RISORIUS_OT_copy_side(HandOperator, Operator):
-    """Make one side of the face like the other; the eyes go on looking the same way"""
+    """Make one side of the face like the other; the gaze stays"""
 
     bl_idname = "risorius.copy_side"
     bl_label = "Copy to Other Side"
@@ -68,7 +68,7 @@ class RISORIUS_OT_copy_side(HandOperator, Operator):
 
 
 class RISORIUS_OT_link_sides(FaceOperator, Operator):
-    """Let one slider move both sides of the face, by drivers; again: each side is free"""
+    """Let one slider move both sides of the face with drivers; press again to free them"""
 
     bl_idname = "risorius.link_sides"
     bl_label = "Link Left and Right"
@@ -100,7 +100,7 @@ class RISORIUS_OT_link_sides(FaceOperator, Operator):
 
 
 class RISORIUS_OT_copy_pose(FaceOperator, Operator):
-    """Copy the pose that is seen, with its layers, to be pasted onto this face or another"""
+    """Copy the visible pose, including layers, for this face or another"""
 
     bl_idname = "risorius.copy_pose"
     bl_label = "Copy Face"
@@ -121,13 +121,13 @@ class RISORIUS_OT_copy_pose(FaceOperator, Operator):
 
 
 class RISORIUS_OT_paste_pose(HandOperator, Operator):
-    """Paste the sliders that were copied"""
+    """Paste the copied sliders"""
 
     bl_idname = "risorius.paste_pose"
     bl_label = "Paste Face"
 
     flipped: bpy.props.BoolProperty(
-        name="Flipped", description="Left for right", options={"SKIP_SAVE"}
+        name="Flipped", description="Swap left and right", options={"SKIP_SAVE"}
     )
 
     @classmethod
@@ -144,9 +144,9 @@ class RISORIUS_OT_paste_pose(HandOperator, Operator):
         cls, context: bpy.types.Context, properties: bpy.types.OperatorProperties
     ) -> str:
         """The tooltip. Args: context  of the button, properties  as it gives them."""
-        text = "Paste the sliders that were copied"
+        text = "Paste the copied sliders"
         if getattr(properties, "flipped", False):
-            text = "Paste the sliders that were copied, left for right"
+            text = "Paste the copied sliders with left and right swapped"
         return bpy.app.translations.pgettext_tip(text) or text
 
     def move(self, context: Context) -> Collection[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""3D views show the face: after an import, where it would be a speck, and when one asks for it."""
+"""Framing a face in 3D views, after an import and on request."""
 
 from collections.abc import Sequence
 from typing import cast
@@ -23,11 +23,11 @@ _SIDE = 0.77  # cosine of 40 degrees: whoever looks from farther aside sees a pr
 
 
 def frame(context: Context, rig: ArmatureObject) -> None:
-    """Let the 3D views of the user's window show a face; one in profile is shown from the front.
+    """Frame a face in the 3D views of the user's window; views from the side turn to the front.
 
-    A view through a camera is left alone, and one that shows the face well already. A solid view in
-    Blender's default colours, one a material, shows the textures' from now on: iris, lips and brows
-    are in them. Views are no part of undo: it takes the face away and leaves the view.
+    Views through a camera stay, and so do views that show the face well. A solid view with
+    Blender's default material colours switches to texture colours, which show iris, lips and brows.
+    Undo does not restore views.
 
     Args:
         context: a Blender context; without a window nothing happens.
@@ -45,17 +45,17 @@ def frame(context: Context, rig: ArmatureObject) -> None:
 
 
 def show_whole(context: Context, rig: ArmatureObject) -> int:
-    """Let the 3D view of the context, else all of the window, show a face.
+    """Frame a face in the 3D view of the context, or in all views of the window.
 
-    Each keeps its direction; outlines of bones and the face board do not count. A view through
-    a camera leaves the camera, as with Blender's Frame Selected.
+    Each keeps its direction; outlines of bones and the face board do not count. A view through a
+    camera leaves the camera, as with Blender's Frame Selected.
 
     Args:
         context: a Blender context.
         rig: deforming armature of the face.
 
     Returns:
-        How many views show it. One that is locked to an object or the 3D cursor does not.
+        The number of views that show it; views locked to an object or the 3D cursor are left out.
     """
     screen = context.window.screen if context.window is not None else None
     areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
@@ -81,11 +81,11 @@ def show_whole(context: Context, rig: ArmatureObject) -> int:
 
 
 def show_with_board(context: Context, rig: ArmatureObject) -> None:
-    """Let a 3D view show head and face board beside each other, from the front.
+    """Frame head and face board side by side in a 3D view, from the front.
 
-    It is that of the context, which leaves its camera for it, else the largest that looks through
-    none. What sidebar, toolbar and headers cover is left free. A view that is locked to an object
-    or the 3D cursor stays.
+    It uses the view of the context, which leaves its camera, or the largest view without a camera.
+    Areas under sidebar, toolbar and headers stay free. A view locked to an object or the 3D cursor
+    stays.
 
     Args:
         context: a Blender context; without a window nothing happens.
@@ -113,7 +113,7 @@ def show_with_board(context: Context, rig: ArmatureObject) -> None:
 
 
 def _largest_or_own(context: Context) -> bpy.types.Area | None:
-    """The context's 3D view, else the window's largest one that looks through no camera."""
+    """The 3D view of the context, or the largest one of the window without a camera."""
     screen = context.window.screen if context.window is not None else None
     areas = [a for a in screen.areas if a.type == "VIEW_3D"] if screen is not None else []
     if context.area in areas:
@@ -184,13 +184,13 @@ def _frame(area: bpy.types.Area, middle: Sequence[float], radius: float, turn: Q
 
 
 def _corners(rig: ArmatureObject) -> NDArray[np.float64]:
-    """float64[N, 3] in the world: the corners of what holds the head."""
+    """float64[N, 3] in the world: the corners of the bounding box of the head."""
     boxes = [(item.matrix_world, item.bound_box) for item in lods.heads(rig)]
     return np.array([matrix @ Vector(c) for matrix, box in boxes for c in box], np.float64)
 
 
 def _ball(rig: ArmatureObject) -> tuple[list[float], float]:
-    """Middle and radius of the head, else of all meshes of the finest level that is built."""
+    """Centre and radius of the head, or of all meshes of the finest existing level."""
     corners = _corners(rig)
     low, high = corners.min(axis=0), corners.max(axis=0)
     return ((low + high) / 2).tolist(), float(np.linalg.norm(high - low)) / 2

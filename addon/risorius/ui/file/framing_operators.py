@@ -29,7 +29,7 @@ class RISORIUS_OT_frame_face(FaceOperator, Operator):
 
     instead: bpy.props.BoolProperty(
         name="Instead of Frame Selected",
-        description="Only where outlines of a face are all that is selected",
+        description="Only if nothing but outlines of a face is selected",
         options={"SKIP_SAVE"},
     )
 
@@ -44,7 +44,7 @@ class RISORIUS_OT_frame_face(FaceOperator, Operator):
 
 
 def _only_outlines(context: Context) -> bool:
-    """Whether the control bones of a face are selected, or its armatures, and nothing else."""
+    """Whether only control bones or armatures of a face are selected."""
     rig = face_rig(context)
     controls = parts.controls_of(rig)
     if context.mode == "POSE":
@@ -72,7 +72,7 @@ class RISORIUS_OT_hide_outlines(FaceOperator, Operator):
 
 
 class RISORIUS_OT_move_outlines(FaceOperator, Operator):
-    """Put the outlines of an older file, which lie over the eyes, beside the face"""
+    """Move the outlines of an older file from the eyes to the side of the face"""
 
     bl_idname = "risorius.move_outlines"
     bl_label = "Move Outlines Beside Face"

@@ -39,14 +39,14 @@ def import_character(
     """Build a character and report on it.
 
     Args:
-        operator: reports through it.
+        operator: operator for the report.
         context: Blender context.
         path: of the DNA file.
         options: build.BuildOptions.
-        show: let the 3D views of the user's window show it.
+        show: frame it in the 3D views of the user's window.
 
     Returns:
-        What `execute` returns.
+        The result for `execute`.
     """
     try:
         with shown_progress(context) as progress:
@@ -97,7 +97,7 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
         default=(True, False, False, False, False, False, False, False),
     )
     shape_mode: bpy.props.EnumProperty(
-        name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
+        name="Shapes", description="Mode of the blend shapes", items=MODES, default="AUTO"
     )
     use_normals: bpy.props.BoolProperty(
         name="Custom Normals", description="Keep the file's own normals", default=True
@@ -107,12 +107,12 @@ class RISORIUS_OT_import_dna(Operator, ImportHelper):
     )
     use_textures: bpy.props.BoolProperty(
         name="Textures",
-        description="Load the textures that lie beside the file, and pack them",
+        description="Load textures beside the file and pack them",
         default=True,
     )
     texture_folder: bpy.props.StringProperty(
         name="Texture Folder",
-        description="Where the textures lie, by MetaHuman's names; empty: beside the file",
+        description="Folder of textures with MetaHuman names; empty: beside the file",
         subtype="DIR_PATH",
     )
     use_simple_materials: bpy.props.BoolProperty(
@@ -198,7 +198,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         name="Person",
         description="Who",
         items=[
-            ("man", "Man", "A young man, who came with Risorius"),
+            ("man", "Man", "A man of 28; comes with Risorius"),
             ("woman", "Woman", "A woman of 31; data (48 MB) are downloaded once"),
             ("girl", "Girl", "A girl of 8; data (48 MB) are downloaded once"),
             ("lady", "Lady", "A woman of 58; data (48 MB) are downloaded once"),
@@ -208,7 +208,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         default="man",
     )
     shape_mode: bpy.props.EnumProperty(
-        name="Shapes", description="How blend shapes are kept", items=MODES, default="AUTO"
+        name="Shapes", description="Mode of the blend shapes", items=MODES, default="AUTO"
     )
     use_frame_view: FRAME_VIEW
     use_studio: bpy.props.BoolProperty(
@@ -267,7 +267,7 @@ class RISORIUS_OT_add_character(RunsBeside, Operator):
         return done
 
     def finish(self, context: Context) -> Result:
-        """Import what was built."""
+        """Import the built face."""
         error = self._task.error
         if error is None:
             return self._import(context)
@@ -302,7 +302,7 @@ def draw_import(self: Menu, _context: Context) -> None:
 
 
 class RISORIUS_MT_sample(Menu):
-    """Who is added, and with what."""
+    """The people to add."""
 
     bl_idname = "RISORIUS_MT_sample"
     bl_label = "Face"
@@ -317,7 +317,7 @@ class RISORIUS_MT_sample(Menu):
 
 
 class RISORIUS_MT_sample_studio(Menu):
-    """Who is added with camera, lights and backdrop."""
+    """The people to add with camera, lights and backdrop."""
 
     bl_idname = "RISORIUS_MT_sample_studio"
     bl_label = "With Studio"

@@ -25,12 +25,12 @@ from ..words import local, of_error, say
 
 
 def report_all(operator: Operator, sentences: Sequence[str], shown: int = 8) -> None:
-    """Report sentences, the last of many as a number.
+    """Report sentences; those beyond a limit as a number.
 
     Args:
-        operator: that reports.
-        sentences: in the order in which they are shown.
-        shown: how many are shown at most.
+        operator: the reporting operator.
+        sentences: in their order.
+        shown: largest number of shown sentences.
     """
     for sentence in sentences[:shown]:
         operator.report({"INFO"}, local(sentence))
@@ -67,7 +67,7 @@ class _FileOperator(FaceOperator):
 
 
 class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
-    """Let another DNA file take this face's place; keys, edits and materials stay"""
+    """Replace the DNA file of this face; keys, edits and materials stay"""
 
     bl_idname = "risorius.replace_dna"
     bl_label = "Replace DNA"
@@ -80,7 +80,7 @@ class RISORIUS_OT_replace_dna(_FileOperator, Operator, ImportHelper):
 
 
 class RISORIUS_OT_reload(_FileOperator, Operator):
-    """Read the face's file again; asks for it where it is no longer in its place"""
+    """Read the file of the face again; asks for the file if it has moved"""
 
     bl_idname = "risorius.reload"
     bl_label = "Reload from Source"
@@ -171,7 +171,7 @@ class RISORIUS_OT_export_dna(_FileOperator, Operator, ExportHelper):
 def draw_export(self: Menu, _context: Context) -> None:
     """Entries of File > Export."""
     self.layout.operator(RISORIUS_OT_export_dna.bl_idname, text="MetaHuman DNA (.dna)")
-    # Beside Blender's own entries of these formats, which write live faces at rest.
+    # Beside Blender's own entries, which write live faces at rest.
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )

@@ -34,24 +34,29 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     joints: bpy.props.IntProperty(
-        name="Joints", description="How many are made", default=120, min=2, max=1000
+        name="Joints", description="Number of joints", default=120, min=2, max=1000
     )
     levels: bpy.props.IntProperty(
         name="Levels of Detail",
-        description="Each with fewer joints and vertices than the one before",
+        description=(
+            "Number of levels of detail; each has fewer joints and vertices than the one before"
+        ),
         default=8,
         min=1,
         max=32,
     )
     use_shapes: bpy.props.BoolProperty(
         name="Keep Shapes",
-        description="What the joints leave of a shape stays as a blend shape",
+        description="Keep the errors of the joints as blend shapes",
         default=True,
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="Millimetres that joints may be off before a blend shape helps; 0: a share of "
-        "the head's height. Where more shapes would be kept than the head has, it is raised",
+        description=(
+            "Largest error of the joints in millimetres without a blend "
+            "shape; 0: a share of the head's height. It is raised if the rig "
+            "would become heavier than the head"
+        ),
         default=0.0,
         min=0.0,
         max=10.0,
@@ -64,7 +69,7 @@ class RISORIUS_OT_make_rig(RunsBeside, Operator, ExportHelper):
     )
     height: bpy.props.FloatProperty(
         name="Height",
-        description="Of the face from the chin to the top, in millimetres. 0: as it is",
+        description="Height of the face from the chin to the top in millimetres. 0: as it is",
         default=0.0,
         min=0.0,
         max=100_000.0,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""A studio around a face that is there."""
+"""A studio around an existing face."""
 
 import bpy
 
@@ -12,8 +12,10 @@ from ..words import say
 
 SCENE_CAMERA = bpy.props.BoolProperty(
     name="Scene Camera",
-    description="Renders show the portrait: the studio's camera becomes the scene's, and the "
-    "camera of before is kept. A scene without a camera takes it anyway",
+    description=(
+        "Make the portrait camera the camera of the scene; the earlier camera"
+        " is kept. A scene without a camera always uses it"
+    ),
     default=True,
     options={"SKIP_SAVE"},
 )

@@ -15,31 +15,31 @@ from ..common import FaceOperator, face_rig
 from ..words import of_error
 
 MOMENTS = (
-    ("NOW", "Current Frame", "Keys are inserted as Blender's auto-key and keying sets say"),
+    ("NOW", "Current Frame", "Insert keys as auto-key and the keying set of Blender require"),
     ("SELECTED", "Selected Keys", "At each frame that has a selected key of this face"),
 )
 
 
 class HandOperator(FaceOperator):
-    """What all operators share that move sliders or control bones.
+    """Base of all operators that move sliders or control bones.
 
-    They say in `move` what they do; when keys are inserted, and which, is said in one place.
+    They define `move`; keys are inserted by shared code.
     """
 
     at: bpy.props.EnumProperty(
-        name="At", description="Which frames are changed", items=MOMENTS, options={"SKIP_SAVE"}
+        name="At", description="Frames to change", items=MOMENTS, options={"SKIP_SAVE"}
     )
 
     def move(self, context: Context) -> Collection[str] | None:
-        """Move the controls from what they show now.
+        """Move the controls from their current values.
 
         Returns:
-            The sliders that it had in its hands; None where it did nothing, and has said why.
+            The handled sliders; None if it did nothing and reported the reason.
         """
         raise NotImplementedError
 
     def stand_at(self, frame: float) -> None:
-        """Is told before each move which frame it is for."""
+        """Called with the frame before each move."""
 
     def execute(self, context: Context) -> Result:
         rig, done = face_rig(context), []

@@ -25,14 +25,14 @@ def favourites_of(context: Context) -> list[str]:
 
 
 class RISORIUS_OT_favourite(FaceOperator, Operator):
-    """Put a control among the favourites, or take it away"""
+    """Add a control to the favourites, or remove it"""
 
     bl_idname = "risorius.favourite"
     bl_label = "Favourite"
     baked_too = True
 
     controls: bpy.props.StringProperty(
-        name="Controls", description="Names of sliders, a line each", options={"SKIP_SAVE"}
+        name="Controls", description="Names of sliders, one in each line", options={"SKIP_SAVE"}
     )
 
     def execute(self, context: Context) -> Result:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Eyes and head: what the eyes look at, how much the face takes of a body's turn, blinks."""
+"""Eyes and head: target of the eyes, share of a body's rotation, blinks."""
 
 import bpy
 
@@ -25,7 +25,7 @@ TARGETS = (
 
 
 def proposed(context: Context) -> str:
-    """The object that eyes are most likely to look at: the one in hand, else the camera; or "".
+    """The most likely target of the eyes: the active object, or the camera, or "".
 
     Args:
         context: has the selection and the scene.
@@ -38,7 +38,7 @@ def proposed(context: Context) -> str:
 
 
 class RISORIUS_OT_gaze_target(FaceOperator, Operator):
-    """What the eyes' target follows"""
+    """Object that the target of the eyes follows"""
 
     bl_idname = "risorius.gaze_target"
     bl_label = "Eyes Follow"
@@ -88,13 +88,17 @@ class RISORIUS_OT_blink(FaceOperator, Operator):
     bl_label = "Blink"
 
     at: bpy.props.EnumProperty(
-        name="At", description="Where blinks begin", items=MOMENTS, options={"SKIP_SAVE"}
+        name="At", description="First frame of the blink", items=MOMENTS, options={"SKIP_SAVE"}
     )
     kind: bpy.props.EnumProperty(
         name="As",
         items=(
-            ("KEYS", "Keys", "Keys of the lids' sliders; keys that lie within the blink go"),
-            ("LAYER", "Layer", "In a layer above the sliders: no key below it is touched"),
+            (
+                "KEYS",
+                "Keys",
+                ("Insert keys on the sliders of the lids; keys within the blink are replaced"),
+            ),
+            ("LAYER", "Layer", "Put the blink into a layer above the sliders; no key changes"),
         ),
     )
     close: bpy.props.FloatProperty(name="Close", description="Frames", default=3.0, min=0.5)

@@ -26,7 +26,7 @@ _NONE = 0.5  # of a breakdown: in the middle
 
 
 def control_under_mouse(context: Context) -> str:
-    """The slider whose button the mouse is over, or "". Args: context  of a key or a menu."""
+    """The slider under the mouse, or "". Args: context of a key or a menu."""
     found = getattr(context, "property", None)
     if found is None or found[0] != parts.controls_of(face_rig(context)):
         return ""
@@ -34,7 +34,7 @@ def control_under_mouse(context: Context) -> str:
 
 
 class RISORIUS_OT_next_key(FaceOperator, Operator):
-    """Go to the next key of the control under the mouse, else of the face or of a region"""
+    """Go to the next key of the control under the mouse, or of the face or region"""
 
     bl_idname = "risorius.next_key"
     bl_label = "Next Key of This Control"
@@ -100,7 +100,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         items=(
             ("ALL", "All", "All sliders and the bones of head and eyes"),
             ("REGION", "Region", "The sliders of a region"),
-            ("SELECTED", "Selected Curves", "What is selected in the animation editors"),
+            ("SELECTED", "Selected Curves", "Curves that are selected in the animation editors"),
             ("FAVOURITES", "Favourites", "The sliders with a star"),
         ),
         options={"SKIP_SAVE"},
@@ -127,7 +127,7 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
         now, paths, factor = keying.pose_of(controls), self._paths(context), self.factor
         if self.kind == "REST":
             return between.move(rig, now, between.rest_pose(rig, now), factor, paths)
-        # What has no curve has no pose before and after.
+        # Controls without a curve have no pose before and after.
         paths &= set(keying.curves_by_path(controls))
         skipped = keying.selected_frames(controls) if self.at == "SELECTED" else ()
         found = between.neighbours(controls, self._frame, now, paths, skipped)
@@ -189,9 +189,10 @@ class RISORIUS_OT_breakdown(HandOperator, Operator):
 
 
 def proposed_range(context: Context) -> tuple[int, int]:
-    """First and last frame of a tweak: of selected keys, of the preview, else around this frame.
+    """First and last frame of a tweak: of selected keys, of the preview range, or around this
+    frame.
 
-    Where all keys are selected nobody chose them: an import selects what it makes.
+    If all keys are selected, the selection is ignored, because an import selects its keys.
 
     Args:
         context: has the face and the scene.
@@ -206,7 +207,7 @@ def proposed_range(context: Context) -> tuple[int, int]:
 
 
 class RISORIUS_OT_tweak(FaceOperator, Operator):
-    """Tweak a range of frames in a layer of its own, which touches no key; again: end the tweak"""
+    """Tweak a range of frames in a layer of its own; keys stay; press again to end the tweak"""
 
     bl_idname = "risorius.tweak"
     bl_label = "Tweak over a Range"

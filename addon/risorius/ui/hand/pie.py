@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""A pie menu of what the hand does most. Nothing opens it until the user gives it a key."""
+"""A pie menu of frequent tools. It has no key until the user assigns one."""
 
 import bpy
 

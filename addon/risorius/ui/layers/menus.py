@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Menus of the panel Layers: what a layer can be made of, reactions, specials."""
+"""Menus of the panel Layers: sources of a layer, reactions, specials."""
 
 import bpy
 

@@ -15,7 +15,7 @@ from ..words import name_of_new, say
 
 
 class LayerOperator(FaceOperator):
-    """What all operators on the active layer share."""
+    """Base of all operators on the active layer."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -28,7 +28,7 @@ class LayerOperator(FaceOperator):
 
     @staticmethod
     def place(controls: ArmatureObject) -> int:
-        """The active layer's place; the highest one's where none is active."""
+        """The place of the active layer, or of the highest one."""
         place, count = controls.risorius_layers_index, len(layers.places(controls))
         if 0 <= place < count and not layers.places(controls)[place].removed:
             return place
@@ -46,8 +46,10 @@ class RISORIUS_OT_layer_add(FaceOperator, Operator):
     )
     source: bpy.props.StringProperty(
         name="Name",
-        description="Of the action or expression; empty: the face's active action, which then is "
-        "no longer played by itself",
+        description=(
+            "Name of the action or expression; empty: the active action, "
+            "which then plays only in the layer"
+        ),
         options={"SKIP_SAVE"},
     )
 
@@ -122,7 +124,7 @@ class RISORIUS_OT_layer_move(LayerOperator, Operator):
 
 
 class RISORIUS_OT_layer_duplicate(LayerOperator, Operator):
-    """Put a copy of the active layer right above it"""
+    """Add a copy of the active layer above it"""
 
     bl_idname = "risorius.layer_duplicate"
     bl_label = "Duplicate Layer"
@@ -135,7 +137,7 @@ class RISORIUS_OT_layer_duplicate(LayerOperator, Operator):
 
 
 class RISORIUS_OT_layer_warp(LayerOperator, Operator):
-    """Pin what the active layer shows now to the current frame, or take all pins away"""
+    """Pin the current time of the active layer to the current frame, or remove all pins"""
 
     bl_idname = "risorius.layer_warp"
     bl_label = "Warp Point"
@@ -179,7 +181,7 @@ class RISORIUS_OT_fire(FaceOperator, Operator):
 
 
 class RISORIUS_OT_unfire(FaceOperator, Operator):
-    """Take the active reaction away"""
+    """Remove the active reaction"""
 
     bl_idname = "risorius.unfire"
     bl_label = "Remove Reaction"
@@ -197,7 +199,7 @@ class RISORIUS_OT_unfire(FaceOperator, Operator):
 
 
 class RISORIUS_OT_layers_to_nla(LayerOperator, Operator):
-    """Make NLA strips of the layers, as far as the NLA can say the same"""
+    """Convert layers to NLA strips, up to the first layer that the NLA cannot represent"""
 
     bl_idname = "risorius.layers_to_nla"
     bl_label = "Push Layers to NLA"

@@ -24,7 +24,7 @@ _NOT_STARTED = "Start live capture first."
 
 
 class _Running(OperatorBase):
-    """What operators share that need a capture of the active face."""
+    """Base of operators that need a running capture of the active face."""
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -37,7 +37,7 @@ class _Running(OperatorBase):
 
 
 def _has_controls(cls: type[Operator], context: Context) -> bool:
-    """Poll: whether a face is active; says so when there is none."""
+    """Poll: whether a face is active; otherwise set the reason."""
     if active_controls(context) is None:
         cls.poll_message_set(say("Select a face first."))
         return False
@@ -45,7 +45,7 @@ def _has_controls(cls: type[Operator], context: Context) -> bool:
 
 
 class RISORIUS_OT_live_start(Operator):
-    """Let the active face follow a capture app, until it is stopped"""
+    """Let the active face follow a capture app until you stop it"""
 
     bl_idname = "risorius.live_start"
     bl_label = "Start"
@@ -82,7 +82,7 @@ def _session(context: Context) -> sessions.Session:
 
 
 class RISORIUS_OT_live_stop(_Running, Operator):
-    """Stop following; a recording is finished, or waits; the sliders go back to where they were"""
+    """Stop live capture; a recording is finished or waits, the sliders return to their values"""
 
     bl_idname = "risorius.live_stop"
     bl_label = "Stop"
@@ -113,10 +113,10 @@ class RISORIUS_OT_live_record(_Running, Operator):
 
 
 class _Waiting(OperatorBase):
-    """What operators share that need a recording that waits."""
+    """Base of operators that need a waiting recording."""
 
     index: bpy.props.IntProperty(
-        name="Recording", description="Which one of those that wait", options={"SKIP_SAVE"}
+        name="Recording", description="Number of the waiting recording", options={"SKIP_SAVE"}
     )
 
     @classmethod
@@ -145,7 +145,7 @@ class _Waiting(OperatorBase):
 
 
 class RISORIUS_OT_live_finish(_Waiting, Operator):
-    """Let the active face play a recording that waits"""
+    """Put a waiting recording on the active face"""
 
     bl_idname = "risorius.live_finish"
     bl_label = "Finish"
@@ -153,7 +153,7 @@ class RISORIUS_OT_live_finish(_Waiting, Operator):
 
     at_current: bpy.props.BoolProperty(
         name="At Current Frame",
-        description="Begin at the scene's frame of now, not where the recording began",
+        description="Begin at the current frame instead of the first frame of the recording",
         options={"SKIP_SAVE"},
     )
 
@@ -172,7 +172,7 @@ class RISORIUS_OT_live_finish(_Waiting, Operator):
 
 
 class RISORIUS_OT_live_discard(_Waiting, Operator):
-    """Throw away a recording that waits; this cannot be undone"""
+    """Delete a waiting recording; this cannot be undone"""
 
     bl_idname = "risorius.live_discard"
     bl_label = "Throw Away"
@@ -189,13 +189,13 @@ class RISORIUS_OT_live_discard(_Waiting, Operator):
 
 
 class RISORIUS_OT_live_neutral(_Running, Operator):
-    """Take the face of this moment as the face at rest: it is subtracted from what comes"""
+    """Use the current face as the neutral face; it is subtracted from received faces"""
 
     bl_idname = "risorius.live_neutral"
     bl_label = "Neutral Now"
 
     forget: bpy.props.BoolProperty(
-        name="Forget", description="Take what comes as it is again", options={"SKIP_SAVE"}
+        name="Forget", description="Use received faces unchanged again", options={"SKIP_SAVE"}
     )
 
     def execute(self, context: Context) -> Result:
@@ -229,12 +229,12 @@ def _finish(
     """End a recording as an action.
 
     Args:
-        operator: reports how it went.
+        operator: operator for the report.
         context: has the face and the scene.
         finish: called with both.
 
     Returns:
-        Whether there is an action. Where there is none, what was recorded waits.
+        Whether an action was made; otherwise the recording waits.
     """
     rig = face_rig(context)
     try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""What the user chose for live capture."""
+"""The user's settings of live capture."""
 
 from typing import cast
 
@@ -30,14 +30,14 @@ def _changed(_self: "RISORIUS_PG_live", given: bpy.types.Context) -> None:
 
 
 class RISORIUS_PG_live(bpy.types.PropertyGroup):
-    """What the user chose; it goes with the window."""
+    """The user's settings, stored with the window."""
 
     source: bpy.props.EnumProperty(
-        name="Source", description="Who sends", items=SOURCES, update=_source_changed
+        name="Source", description="App that sends", items=SOURCES, update=_source_changed
     )
     port: bpy.props.IntProperty(
         name="Port",
-        description="UDP port to listen at, the one that the app sends to",
+        description="UDP port to which the app sends",
         default=PORTS.get("livelink", 1),
         min=1,
         max=65535,
@@ -50,17 +50,19 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     subject: bpy.props.StringProperty(
         name="Subject",
-        description="Whom to follow, by the name that the app sends; empty for the first heard",
+        description=(
+            "Name of the subject to follow, as the app sends it; empty: the first one received"
+        ),
         update=_changed,
     )
     mapping: bpy.props.StringProperty(
         name="Mapping",
-        description="File that says which controls a name moves; empty for ARKit's names and VRM's",
+        description="Mapping file from names to controls; empty: names of ARKit and VRM",
         subtype="FILE_PATH",
     )
     smoothing: bpy.props.FloatProperty(
         name="Smoothing",
-        description="Hold a still face still; a recording keeps what was sent",
+        description="Smooth small jitter in the view; recordings stay unsmoothed",
         default=0.3,
         min=0.0,
         max=1.0,
@@ -76,7 +78,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
     )
     head_gain: bpy.props.FloatProperty(
         name="Head",
-        description="Factor on the head's turn: 0 leaves the head alone, -1 turns it around",
+        description="Factor of the head's rotation: 0 keeps the head still, -1 inverts it",
         default=1.0,
         min=-2.0,
         max=2.0,
@@ -85,7 +87,7 @@ class RISORIUS_PG_live(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_live:
-    """What the user chose."""
+    """The user's settings."""
     return cast(RISORIUS_PG_live, context.window_manager.risorius_live)
 
 

@@ -19,29 +19,31 @@ from ..words import of_error, say
 
 
 class _Learns(FaceOperator):
-    """What operators share that learn a range."""
+    """Base of operators that learn a range."""
 
     baked_too = True
 
     most_gain: bpy.props.FloatProperty(
         name="Most Gain",
-        description="A control that would have to be stretched more stays as captured; lids may "
-        "be stretched by 2",
+        description=(
+            "Largest factor of a control; a control that needs more stays as "
+            "captured. Lids may have 2"
+        ),
         default=1.6,
         min=1.0,
         max=4.0,
     )
 
     def keep(self, context: Context, clip: "native.Clip", performance: bool) -> None:
-        """Learn from a clip as captured, and keep what was learned with the active face.
+        """Learn a range from a captured clip and store it with the active face.
 
         Args:
             context: has the face.
             clip: risorius.Clip of raw controls.
-            performance: whether it shows acting, not all extremes.
+            performance: True: the clip shows acting and not all extremes.
 
         Raises:
-            risorius.RisoriusError: nothing can be learned of it.
+            risorius.RisoriusError: the clip gives no range.
         """
         found = native.part("ranges").learn(clip, performance=performance, most_gain=self.most_gain)
         range_properties.keep(face_controls(context), found)
@@ -57,7 +59,7 @@ class _Learns(FaceOperator):
 
 
 class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
-    """Learn how far each control of this person goes in captures, so that blinks close the eyes"""
+    """Learn the range of each control of this person, so that blinks close the eyes"""
 
     bl_idname = "risorius.learn_range"
     bl_label = "Learn Range"
@@ -89,13 +91,13 @@ class RISORIUS_OT_learn_range(_Learns, Operator, ImportHelper):
 
 
 class RISORIUS_OT_learn_range_live(_Learns, Operator):
-    """Learn the range from what live capture received in the last seconds"""
+    """Learn the range from the last seconds of live capture"""
 
     bl_idname = "risorius.learn_range_live"
     bl_label = "Learn from Live"
 
     seconds: bpy.props.FloatProperty(
-        name="Seconds", description="How far back", default=30.0, min=2.0, max=60.0
+        name="Seconds", description="Seconds to learn from", default=30.0, min=2.0, max=60.0
     )
 
     @classmethod
@@ -120,7 +122,7 @@ class RISORIUS_OT_learn_range_live(_Learns, Operator):
 
 
 class RISORIUS_OT_load_range(FaceOperator, Operator, ImportHelper):
-    """Take the range of a person from a file"""
+    """Load the range of a person from a file"""
 
     bl_idname = "risorius.load_range"
     bl_label = "Load Range"
@@ -140,7 +142,7 @@ class RISORIUS_OT_load_range(FaceOperator, Operator, ImportHelper):
 
 
 class _HasRange(FaceOperator):
-    """What operators share that need a range."""
+    """Base of operators that need a range."""
 
     baked_too = True
 
@@ -176,7 +178,7 @@ class RISORIUS_OT_save_range(_HasRange, Operator, ExportHelper):
 
 
 class RISORIUS_OT_forget_range(_HasRange, Operator):
-    """Take the range away from this face: captures come as they are"""
+    """Remove the range of this face; captures stay as captured"""
 
     bl_idname = "risorius.forget_range"
     bl_label = "Forget Range"

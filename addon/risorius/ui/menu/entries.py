@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The submenus of the menu Face. An entry that cannot be used is grey, and its tooltip says why."""
+"""The submenus of the menu Face. An unavailable entry is grey, and its tooltip gives the reason."""
 
 from ... import native
 from ...scene.character import board, runtime

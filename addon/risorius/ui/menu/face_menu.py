@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The menu Face of the 3D view's header, through which Blender's search finds all of it."""
+"""The menu Face of the 3D view's header, which lets Blender's search find every command."""
 
 import bpy
 
@@ -73,8 +73,8 @@ def _draw_pose(layout: UILayout, controls: ArmatureObject | None) -> None:
 def draw_header(self: Menu, context: Context) -> None:
     """The menu's name in the header. Args: self, context  of the header's menus.
 
-    Blender's search shows and searches the words of the buttons that lead to an entry: so who types
-    the add-on's name finds all of it.
+    Blender's search also uses the names of the menus that contain an entry, so the name of the
+    add-on finds every command.
     """
     if context.mode in _MODES:
         text = words.say("Face (Risorius)")

@@ -42,7 +42,7 @@ def _not_mixed(own: Mapping[str, str]) -> list[str]:
 
 
 def _add(operator: Operator, context: Context, paths: list[str]) -> Result:
-    """Adds faces to those that are mixed; those that do not go together are said and left out."""
+    """Add faces to the mix; faces that do not match are reported and left out."""
     chosen = choices(context)
     added = 0
     for path in paths:
@@ -72,7 +72,7 @@ class _Usable:
 
 
 class RISORIUS_OT_mix_add(_Usable, Operator, ImportHelper):
-    """Add faces of the same topology to those that are mixed"""
+    """Add faces of the same topology to the mix"""
 
     bl_idname = "risorius.mix_add"
     bl_label = "Add Face Files"
@@ -92,7 +92,7 @@ class RISORIUS_OT_mix_add(_Usable, Operator, ImportHelper):
 
 
 class RISORIUS_OT_mix_add_scene(_Usable, Operator):
-    """Add the files of this scene's faces to those that are mixed"""
+    """Add the files of this scene's faces to the mix"""
 
     bl_idname = "risorius.mix_add_scene"
     bl_label = "Add the Scene's Faces"
@@ -107,7 +107,7 @@ class RISORIUS_OT_mix_add_scene(_Usable, Operator):
 
 
 class RISORIUS_OT_mix_remove(Operator):
-    """Take this face out of those that are mixed"""
+    """Remove this face from the mix"""
 
     bl_idname = "risorius.mix_remove"
     bl_label = "Remove"
@@ -141,7 +141,7 @@ class _Mixes(_Usable):
 
 
 class RISORIUS_OT_mix_preview(_Mixes, Operator):
-    """Show the mix as a mesh that follows the sliders; press again to take it away"""
+    """Show the mix as a mesh that follows the sliders; press again to remove it"""
 
     bl_idname = "risorius.mix_preview"
     bl_label = "Preview"
@@ -170,7 +170,7 @@ class RISORIUS_OT_mix_write(_Mixes, Operator, ExportHelper):
     filename_ext = ".dna"
     filter_glob: bpy.props.StringProperty(default="*.dna", options={"HIDDEN"})
     use_import: bpy.props.BoolProperty(
-        name="Import", description="Import the face that is written", default=True
+        name="Import", description="Import the new face", default=True
     )
 
     def execute(self, context: Context) -> Result:

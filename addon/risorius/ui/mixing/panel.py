@@ -19,7 +19,8 @@ class RISORIUS_PT_mix(FacePanel, Panel):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Beside a face it lies in Options: one more section does not fit a laptop's window."""
+        """Beside a face the panel is in Options, because one more section does not fit a laptop's
+        window."""
         return active_controls(context) is None
 
     def draw(self, context: Context) -> None:
@@ -37,7 +38,7 @@ class RISORIUS_PT_mix_here(FaceOnlyPanel, Panel):
 
 
 def draw_mix(layout: UILayout, context: Context) -> None:
-    """The faces that are mixed, and what can be done with the mix.
+    """Draw the faces of the mix and its actions.
 
     Args:
         layout: of a panel.

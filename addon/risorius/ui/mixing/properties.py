@@ -20,7 +20,7 @@ def _changed(_self: bpy.types.PropertyGroup, given: bpy.types.Context) -> None:
 
 
 _SHARE = {"min": 0.0, "max": 1.0, "subtype": "FACTOR", "update": _changed}
-_HERE = "How much of this region is this face's; what is left is as on the whole"
+_HERE = "Share of this face in this region; the rest follows the whole mix"
 
 
 class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
@@ -28,7 +28,7 @@ class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
 
     path: bpy.props.StringProperty(name="File", subtype="FILE_PATH")
     share: bpy.props.FloatProperty(
-        name="Share", description="How much of the whole is this face's", default=1.0, **_SHARE
+        name="Share", description="Share of this face in the whole mix", default=1.0, **_SHARE
     )
     show_regions: bpy.props.BoolProperty(
         name="Regions", description="Take some regions from this face", default=False
@@ -44,13 +44,13 @@ class RISORIUS_PG_mix_parent(bpy.types.PropertyGroup):
 
 
 class RISORIUS_PG_mix(bpy.types.PropertyGroup):
-    """What the user chose; it goes with the window."""
+    """The user's settings, stored with the window."""
 
     parents: bpy.props.CollectionProperty(type=RISORIUS_PG_mix_parent)
 
 
 def choices(context: Context) -> RISORIUS_PG_mix:
-    """What the user chose.
+    """The user's settings.
 
     Args:
         context: Blender context.
@@ -86,7 +86,7 @@ def shares_of(context: Context) -> tuple[list[float], dict[str, dict[int, float]
 
 
 def follow(context: Context) -> None:
-    """Moves the preview, if there is one, to what the sliders say.
+    """Update the preview, if there is one, to the sliders.
 
     Args:
         context: Blender context.

@@ -32,16 +32,16 @@ class RISORIUS_OT_solo(FaceOperator, Operator):
     bl_label = "Solo"
 
     control: bpy.props.StringProperty(
-        name="Control", description="Name of the slider; empty for the one that is looked at"
+        name="Control", description="Name of the slider; empty: the slider of See Why"
     )
     corrective: bpy.props.IntProperty(
         name="Corrective",
-        description="Instead of a control: all that this corrective is the product of",
+        description="Number of a corrective; show its controls instead of one control",
         default=-1,
         options={"HIDDEN", "SKIP_SAVE"},
     )
     extend: bpy.props.BoolProperty(
-        name="Extend", description="Beside those that are shown already", options={"SKIP_SAVE"}
+        name="Extend", description="Add to the shown controls", options={"SKIP_SAVE"}
     )
 
     def execute(self, context: Context) -> Result:
@@ -62,15 +62,13 @@ class RISORIUS_OT_solo(FaceOperator, Operator):
 
 
 class RISORIUS_OT_mute(FaceOperator, Operator):
-    """Let the joints, the shapes or the maps of the face rest in the view, or move again"""
+    """Mute or unmute the joints, shapes or maps of the face in the view"""
 
     bl_idname = "risorius.mute"
     bl_label = "Mute"
 
-    kind: bpy.props.EnumProperty(name="Kind", description="What rests", items=MUTED)
-    enable: bpy.props.BoolProperty(
-        name="Mute", description="Whether they rest; else they move again", default=True
-    )
+    kind: bpy.props.EnumProperty(name="Kind", description="Part to mute", items=MUTED)
+    enable: bpy.props.BoolProperty(name="Mute", description="On: mute. Off: unmute", default=True)
 
     def execute(self, context: Context) -> Result:
         rig = face_rig(context)
@@ -93,13 +91,13 @@ class RISORIUS_OT_show_all(FaceOperator, Operator):
 
 
 class RISORIUS_OT_mask_renders(FaceOperator, Operator):
-    """Whether renders leave out too what is left out of the view"""
+    """Apply solo and mute in renders too"""
 
     bl_idname = "risorius.mask_renders"
     bl_label = "In Renders Too"
 
     enable: bpy.props.BoolProperty(
-        name="In Renders Too", description="Whether renders leave it out too", default=True
+        name="In Renders Too", description="Apply in renders too", default=True
     )
 
     def execute(self, context: Context) -> Result:
@@ -109,26 +107,28 @@ class RISORIUS_OT_mask_renders(FaceOperator, Operator):
 
 
 class RISORIUS_OT_heat(FaceOperator, Operator):
-    """Colour the face by how far it is moved; materials stay, one click takes the colours away"""
+    """Colour the face by its motion; materials stay, and one click removes the colours"""
 
     bl_idname = "risorius.heat"
     bl_label = "Heat Map"
 
     kind: bpy.props.EnumProperty(
         name="Kind",
-        description="What moves it",
+        description="Source of the motion",
         items=(
-            ("POSE", "From Neutral", "How far the pose of now is from neutral"),
-            ("CONTROL", "Reach of a Control", "How far a control moves the neutral face"),
-            ("CORRECTIVE", "A Corrective", "What a corrective adds to the pose of now"),
-            ("LAYER", "A Layer", "What a layer adds to the pose of now"),
-            ("OFF", "Off", "Take the colours away; views show what they showed before"),
+            ("POSE", "From Neutral", "Distance of the current pose from the neutral pose"),
+            ("CONTROL", "Reach of a Control", "Motion of the neutral face by one control"),
+            ("CORRECTIVE", "A Corrective", "Share of a corrective in the current pose"),
+            ("LAYER", "A Layer", "Share of a layer in the current pose"),
+            ("OFF", "Off", "Remove the colours; views return to their earlier shading"),
         ),
     )
     what: bpy.props.StringProperty(
         name="What",
-        description="Name of the control, number of the corrective, place of the layer; empty: the "
-        "control or layer that is chosen",
+        description=(
+            "Name of the control, number of the corrective, place of the "
+            "layer; empty: the chosen control or layer"
+        ),
     )
 
     def execute(self, context: Context) -> Result:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What See Why draws over the 3D view: what is left out, the ramp of a heat map, correctives."""
+"""Drawing of See Why over the 3D view: solo and mute, the ramp of a heat map, correctives."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ _MOST = 9  # correctives that are drawn
 
 
 def start() -> None:
-    """Draw from now on, where there is something to draw."""
+    """Start drawing."""
     if not _handles:
         view = bpy.types.SpaceView3D
         _handles.append(view.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
 
 
 def stop() -> None:
-    """Draw nothing any more."""
+    """Stop drawing."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
 
@@ -80,7 +80,7 @@ class _Pen:
         return float(blf.dimensions(0, text)[0])
 
     def cut(self, text: str, most: float) -> str:
-        """A name that fits, with dots where it does not."""
+        """A name shortened with dots to fit."""
         if self.width(text) <= most:
             return text
         while text and self.width(text + "...") > most:
@@ -99,7 +99,7 @@ def _draw() -> None:
         return
     pen = _Pen(context)
     gpu.state.blend_set("ALPHA")
-    # Above the settings of the last operator, which lie in this corner.
+    # Start above the redo panel, which lies in this corner.
     x, y = 20.0 * pen.scale + _tools(context), 72.0 * pen.scale
     if shown is not None:
         y = _draw_ramp(pen, words.say(title(context, rig, shown)), shown, x, y)
@@ -116,7 +116,7 @@ def _tools(context: Context) -> int:
 
 
 def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> float:
-    """The colours with their range. Returns where the next thing may stand."""
+    """Draw the colours with their range. Returns: the next free height."""
     width, height, unit = 220.0 * pen.scale, 14.0 * pen.scale, pen.scale
     full = max(width, pen.width(text)) + 20 * unit
     pen.box(x - 10 * unit, y - 8 * unit, full, height + 48 * unit, _BOX)
@@ -132,11 +132,11 @@ def _draw_ramp(pen: _Pen, text: str, shown: heat.Heat, x: float, y: float) -> fl
 
 
 def look_in_words(context: Context, look: look_masks.Look) -> str:
-    """What is left out of a face, in a sentence.
+    """A sentence about solo and mute of a face.
 
     Args:
         context: has the preferences.
-        look: what is shown.
+        look: the Look of the face.
     """
     if look.solo:
         names = ", ".join(sorted(spoken(context, label) for label in look.solo))

@@ -171,7 +171,7 @@ def _ask() -> None:
 
 
 def stop() -> None:
-    """Ask for nothing any more."""
+    """Stop the requests."""
     if bpy.app.timers.is_registered(_ask):
         bpy.app.timers.unregister(_ask)
     _soon.now = False

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""What moves this vertex: picked in the view, selected, or given by number."""
+"""The operator What Moves This Vertex: the vertex is picked in the view, selected, or given by
+number."""
 
 from typing import cast
 
@@ -108,7 +109,7 @@ def _redraw(context: Context) -> None:
 
 
 def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
-    """The active mesh of the face and its first selected vertex; -1 where there is none."""
+    """The active mesh of the face and its first selected vertex; -1 for none."""
     item = context.object
     if item is None or item.type != "MESH" or parts.rig_of(item) != rig:
         return -1, -1
@@ -122,11 +123,11 @@ def _selected(context: Context, rig: ArmatureObject) -> tuple[int, int]:
 
 
 def under(context: Context, event: bpy.types.Event) -> tuple[ArmatureObject, int, int] | None:
-    """The face, its mesh and the vertex under the pointer; None where there is no face.
+    """The face, its mesh and the vertex under the pointer; None without a face.
 
     Args:
         context: Blender context.
-        event: that has the pointer's place in the window.
+        event: with the place of the pointer in the window.
     """
     area = context.area
     if area is None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""What the user looks at in See Why; it goes with the window."""
+"""The settings of See Why, stored with the window."""
 
 from collections.abc import Iterator
 from typing import cast
@@ -23,11 +23,11 @@ def _labels(_self: bpy.types.PropertyGroup, given: bpy.types.Context, typed: str
 
 
 class RISORIUS_PG_why(bpy.types.PropertyGroup):
-    """What the user looks at."""
+    """The settings of See Why."""
 
     control: bpy.props.StringProperty(
         name="Control",
-        description="The slider that is looked at: its reach, its correctives, it alone",
+        description="Slider to examine: its reach, its correctives, solo",
         search=_labels,
         search_options={"SORT"},
     )
@@ -38,7 +38,7 @@ class RISORIUS_PG_why(bpy.types.PropertyGroup):
 
 
 def choices(context: Context) -> RISORIUS_PG_why:
-    """What the user looks at. Args: context  Blender context."""
+    """The settings of See Why. Args: context Blender context."""
     return cast(RISORIUS_PG_why, context.window_manager.risorius_why)  # type: ignore[attr-defined]
 
 

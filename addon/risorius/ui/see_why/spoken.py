@@ -13,11 +13,11 @@ _PRODUCT = " x "  # between the factors of a corrective
 
 
 def spoken(context: Context, name: str) -> str:
-    """A control's name in words, with left and right as the panel of the sliders has them.
+    """A control's name in words, with left and right as in the panel of the sliders.
 
     Args:
         context: has the preferences.
-        name: of a control, or those of a corrective's factors.
+        name: name of a control, or names of a corrective's factors.
     """
     swapped = as_seen(context)
     return _PRODUCT.join(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the shape keys of a head are, before a rig is made of it: a list with pictures."""
+"""The list of a head's shape keys with pictures, before a rig is made from it."""
 
 from . import curves, operators, panel
 

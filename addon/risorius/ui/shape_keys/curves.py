@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Curves of an imported file that no mapping knows: what they are, kept as a mapping."""
+"""Unknown curves of an imported file: assigning them, and saving the mapping."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ _MOST = 40  # lines that are drawn
 
 
 class _OfCurves(FaceOperator):
-    """What operators on unknown curves share."""
+    """Base of operators on unknown curves."""
 
     baked_too = True
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the face has unknown curves; says why not."""
+        """Whether the face has unknown curves; otherwise set the reason."""
         if not super().poll(context):
             return False
         if unknown_curves.of(face_controls(context)) is None:
@@ -46,7 +46,7 @@ class _OfCurves(FaceOperator):
 
 
 class RISORIUS_OT_assign_curve(_OfCurves, Operator):
-    """Say which control or expression a curve of the imported file is; empty: it is left out"""
+    """Assign a control or expression to a curve of the imported file; empty: leave it out"""
 
     bl_idname = "risorius.assign_curve"
     bl_label = "Assign Curve"
@@ -67,7 +67,7 @@ class RISORIUS_OT_assign_curve(_OfCurves, Operator):
 
 
 class RISORIUS_OT_choose_curve(_OfCurves, Operator):
-    """Look for the control or the expression that a curve of the imported file is"""
+    """Search the control or expression for a curve of the imported file"""
 
     bl_idname = "risorius.choose_curve"
     bl_label = "Choose for a Curve"
@@ -87,7 +87,7 @@ class RISORIUS_OT_choose_curve(_OfCurves, Operator):
 
 
 class RISORIUS_OT_save_curve_mapping(_OfCurves, Operator, ExportHelper):
-    """Write what you said of the curves as a mapping, and import the file again by it"""
+    """Save your assignments as a mapping and import the file again with it"""
 
     bl_idname = "risorius.save_curve_mapping"
     bl_label = "Save Mapping"
@@ -95,7 +95,7 @@ class RISORIUS_OT_save_curve_mapping(_OfCurves, Operator, ExportHelper):
     filename_ext = ".toml"
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
     use_import: bpy.props.BoolProperty(
-        name="Import Again", description="The same file, by the new mapping", default=True
+        name="Import Again", description="Import the file again with the new mapping", default=True
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:

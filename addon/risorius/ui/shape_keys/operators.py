@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators that say what a shape key is, keep that in a file, and draw the pictures of keys."""
+"""Operators that assign shape keys, save and load the assignments, and draw pictures of keys."""
 
 from __future__ import annotations
 
@@ -32,25 +32,26 @@ from . import shown
 
 WAYS = (
     ("CHOSEN", "Control or Expression", "What is chosen"),
-    ("NAME", "By Its Name", "What its name says, as for keys of which nobody says anything"),
+    ("NAME", "By Its Name", "Guess from the name of the key"),
     ("OWN", "Control of Its Own", "A new control with the name of the key"),
-    ("NOTHING", "Leave Out", "The rig does without it"),
+    ("NOTHING", "Leave Out", "Leave the key out of the rig"),
 )
 _AT_ONCE = 6  # pictures after which the sidebar is drawn again
 
 EnumItem = tuple[str, str, str, int, int]
-# What can be chosen, as Blender has it; it keeps no copy of the words.
+# Items of the enum; Blender keeps no copy of their strings.
 _items: list[EnumItem] = session.keep("shape_keys.items", list, ("unregister",))
 
 
 class OfHead(OperatorBase):
-    """What all operators on the keys of a head share."""
+    """Base of all operators on the keys of a head."""
 
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the active object is a head whose keys one may speak of; says why if not."""
+        """Whether the active object is a head whose keys can be assigned; otherwise set the
+        reason."""
         if not usable(cls):
             return False
         if not shape_key_head.usable_head(context.active_object):
@@ -65,7 +66,7 @@ def head_of(context: Context) -> MeshObject:
 
 
 class Says(OfHead):
-    """What operators share that say what a key is."""
+    """Base of operators that assign a key."""
 
     key: bpy.props.StringProperty(
         name="Shape Key", description="Empty: the active one", options={"SKIP_SAVE"}
@@ -81,7 +82,7 @@ class Says(OfHead):
         return True
 
     def keep(self, context: Context, value: assigned.Said | None) -> Result:
-        """Keep what is said of the key. Args: context, value  None: its name decides."""
+        """Store the assignment of the key. Args: context, value None: its name decides."""
         item = head_of(context)
         name = self.key or shown.active_key(item)
         if name not in assigned.of(item).rows:
@@ -97,7 +98,7 @@ class Says(OfHead):
 
 
 class RISORIUS_OT_assign_shape_key(Says, Operator):
-    """Say what a shape key becomes when a rig is made of this head"""
+    """Assign a control or expression to a shape key of this head"""
 
     bl_idname = "risorius.assign_shape_key"
     bl_label = "Assign Shape Key"
@@ -133,7 +134,7 @@ choice_items = _listed
 
 
 def fill_choices() -> None:
-    """What can be chosen, with the pictures that are there by now."""
+    """Fill the enum with the existing pictures."""
     _items[:] = [
         (
             choice.value,
@@ -147,7 +148,7 @@ def fill_choices() -> None:
 
 
 class RISORIUS_OT_choose_shape_key(Says, Operator):
-    """Look for the control or the expression that this shape key is, by its name"""
+    """Search the control or expression for this shape key by name"""
 
     bl_idname = "risorius.choose_shape_key"
     bl_label = "Choose a Control or Expression"
@@ -181,7 +182,7 @@ class RISORIUS_OT_select_shape_key(OfHead, Operator):
 
 
 class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
-    """Write what you said of the shape keys into a file, for other heads and for risorius author"""
+    """Save the assignments of shape keys to a file, for other heads and for risorius author"""
 
     bl_idname = "risorius.save_shape_key_names"
     bl_label = "Save Names"
@@ -190,7 +191,8 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
     filename_ext = ".toml"
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
     use_all: bpy.props.BoolProperty(
-        name="All Keys", description="Also what the names of keys say, to be edited as a text"
+        name="All Keys",
+        description=("Include guesses from names, so that you can edit them as text"),
     )
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
@@ -215,7 +217,7 @@ class RISORIUS_OT_save_shape_key_names(OfHead, Operator, ExportHelper):
 
 
 class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
-    """Take what a file says of shape keys: one that was saved here, or that of risorius author"""
+    """Load assignments of shape keys from a file of this list or of risorius author"""
 
     bl_idname = "risorius.load_shape_key_names"
     bl_label = "Load Names"
@@ -245,18 +247,18 @@ class RISORIUS_OT_load_shape_key_names(Says, Operator, ImportHelper):
 
 
 class RISORIUS_OT_shape_key_pictures(RunsBeside, OfHead, Operator):
-    """Draw the pictures of the shape keys of this head, and of what they are; Esc ends it"""
+    """Draw pictures of the shape keys of this head and of their controls; Esc cancels"""
 
     bl_idname = "risorius.shape_key_pictures"
     bl_label = "Draw Pictures"
     bl_options = set()
 
     again: bpy.props.BoolProperty(
-        name="All Anew", description="Also pictures that are there", options={"SKIP_SAVE"}
+        name="All Anew", description="Draw existing pictures again", options={"SKIP_SAVE"}
     )
     use_choices: bpy.props.BoolProperty(
         name="What Can Be Chosen",
-        description="Also what no key here is, for the list of Choose",
+        description="Include controls without a key in the list of Choose",
         options={"SKIP_SAVE"},
     )
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""The panel Names of Shape Keys: what each key of a head is, with its picture."""
+"""The panel Names of Shape Keys: the assignment of each key of a head, with its picture."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from . import shown
 _ROWS = 5
 _PICTURE = 6.0  # lines that a picture is high
 _LITTLE = 2.0  # the same in the list
-# Heads, and what they become, whose pictures were begun by themselves.
+# Heads with assignments whose pictures were started automatically.
 _asked: set[tuple[int, str]] = session.keep("shape_keys.asked", set, ("undo", "load"))
 
 
 class RISORIUS_UL_shape_key_names(UIList):
-    """One line per shape key: its picture, its name, what it becomes; unknown ones first."""
+    """One line for each shape key: picture, name, assignment; unknown ones first."""
 
     only_unknown: bpy.props.BoolProperty(
-        name="Only Unknown Names", description="Show only the shape keys that no name explains"
+        name="Only Unknown Names", description="Show only shape keys with unknown names"
     )
 
     def draw_item(
@@ -71,7 +71,7 @@ class RISORIUS_UL_shape_key_names(UIList):
         button.key = item.name
 
     def draw_filter(self, context: Context, layout: UILayout) -> None:
-        """What is shown of the list. Args: context, layout  Blender's, below the list."""
+        """Draw the filter of the list. Args: context, layout Blender's, below the list."""
         row = layout.row(align=True)
         row.prop(self, "filter_name", text="", icon="VIEWZOOM")
         row.prop(self, "only_unknown", text="", icon="QUESTION")
@@ -92,7 +92,7 @@ class RISORIUS_UL_shape_key_names(UIList):
 
         flags = [self.bitflag_filter_item if is_shown(name) else 0 for name in names]
         known = [name in rows and rows[name].is_known for name in names]
-        # By the names alone: what the user has said leaves a row where it is.
+        # Sort by names alone, so that an assignment does not move a row.
         ranked = sorted(range(len(names)), key=known.__getitem__)
         order = [0] * len(names)
         for place, index in enumerate(ranked):
@@ -146,7 +146,7 @@ def _draw_count(layout: UILayout, names: assigned.Names) -> None:
 
 
 def _draw_one(layout: UILayout, row: assigned.Row, picture: int, sample: str) -> None:
-    """The active key: its picture beside that of what it becomes, and what can be said of it."""
+    """Draw the active key: its picture beside the picture of its assignment, and the buttons."""
     box = layout.box()
     pair = box.split(factor=0.5)
     _draw_picture(pair.column(align=True), picture, row.key)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words for what a shape key becomes, and which key of a head is the active one."""
+"""Words for assignments of shape keys, and the active key of a head."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def active_key(item: MeshObject) -> str:
 
 
 def label_of_choice(choice: assigned.Choice) -> str:
-    """What somebody looks for. Args: choice  one of assigned.choices."""
+    """The searchable label of a choice. Args: choice one of assigned.choices."""
     if choice.kind == assigned.UNIT:
         return f"{choice.label} (ARKit)"
     if choice.kind == assigned.EXPRESSION:
@@ -30,12 +30,12 @@ def label_of_choice(choice: assigned.Choice) -> str:
 
 
 def tooltip_of_choice(choice: assigned.Choice) -> str:
-    """What it does, in the user's language. Args: choice  one of assigned.choices."""
+    """The tooltip of a choice in the user's language. Args: choice one of assigned.choices."""
     return (bpy.app.translations.pgettext_tip(choice.does) or "") if choice.does else ""
 
 
 def becomes(row: assigned.Row) -> str:
-    """What a key becomes, in a few words. Args: row  of assigned.of."""
+    """The assignment of a key in a few words. Args: row from assigned.of."""
     if row.kind == assigned.EXPRESSION:
         own = _expressions().get(row.expression)
         label = words.say(own.label) if own is not None else row.expression
@@ -52,7 +52,7 @@ def becomes(row: assigned.Row) -> str:
 
 
 def who_knows(row: assigned.Row) -> str:
-    """A sentence on who says what a key is. Args: row  of assigned.of."""
+    """A sentence about the source of an assignment. Args: row from assigned.of."""
     if row.holder:
         return words.say("{name} is that already: a control has one key.", name=row.holder)
     if row.is_said:
@@ -79,7 +79,7 @@ def words_of_controls(controls: tuple[str, ...]) -> str:
 
 
 def words_of_value(value: str) -> str:
-    """What was chosen, in a few words. Args: value  of an assigned.Choice, "" for left out."""
+    """A choice in a few words. Args: value of an assigned.Choice, "" for left out."""
     if not value:
         return words.say("Left out")
     choice = next((c for c in assigned.choices() if c.value == value), None)
@@ -87,17 +87,17 @@ def words_of_value(value: str) -> str:
 
 
 def value_of(row: assigned.Row) -> assigned.Said:
-    """What a key becomes, as a file of names says it. Args: row  of assigned.of."""
+    """The assignment of a key in the form of a file of names. Args: row from assigned.of."""
     if row.expression:
         return f"@{row.expression}"
     return row.controls[0] if len(row.controls) == 1 else list(row.controls)
 
 
 def sample_of(row: assigned.Row) -> str:
-    """What the sample man shows for a key, as assigned.Choice says it; "" where he has no such.
+    """The choice that the sample man shows for a key, as assigned.Choice; "" for none.
 
     Args:
-        row: of assigned.of.
+        row: from assigned.of.
     """
     if row.kind == assigned.EXPRESSION:
         return f"@{row.expression}" if row.expression in _expressions() else ""

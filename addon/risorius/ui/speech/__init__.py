@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Speech: a sound file becomes movement of the face, and what it says can be corrected."""
+"""Speech: converting a sound file to movement of the face, and correcting it."""
 
 from . import correcting, install, operators, panel
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Blender takes properties where Python has annotations:
 # pyright: reportInvalidTypeForm=false
-"""Operators that correct what a voice says: sounds, words, markers."""
+"""Operators that correct the sounds, words and markers of a voice."""
 
 import sys
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _MOVED = "The markers were changed: choose Update Speech first."
 
 
 def voice_of(context: Context) -> bpy.types.Action | None:
-    """The action whose voice the panel shows, or None where the face speaks none."""
+    """The action whose voice the panel shows, or None."""
     return next(iter(voices.all_of(face_controls(context))), None)
 
 
@@ -38,7 +38,7 @@ def are_moved(context: Context, action: bpy.types.Action) -> bool:
 
 
 class _Corrects(FaceOperator):
-    """What all corrections share: the voice, its keys and markers follow, errors are sentences."""
+    """Base of all corrections: keys and markers follow, errors are sentences."""
 
     reads_markers = False  # it may be used while changed markers wait
 
@@ -102,7 +102,7 @@ class _CorrectsSound(_Corrects):
     def _corrected(
         self, sounds: Sequence[Sound], place: int, end: float
     ) -> tuple[list[Sound], int]:
-        """The new list, and the place in it that is chosen from now on. Raises: SpokenError."""
+        """The new list, and the selected place in it. Raises: SpokenError."""
         raise NotImplementedError
 
 
@@ -158,7 +158,7 @@ class RISORIUS_OT_sound_insert(_CorrectsSound, Operator):
 
 
 class RISORIUS_OT_sound_remove(_CorrectsSound, Operator):
-    """Remove the chosen sound; the one before it takes its time. The keys of the mouth follow"""
+    """Remove the chosen sound; the sound before it becomes longer. The keys of the mouth follow"""
 
     bl_idname = "risorius.sound_remove"
     bl_label = "Remove Sound"
@@ -170,7 +170,7 @@ class RISORIUS_OT_sound_remove(_CorrectsSound, Operator):
 
 
 class RISORIUS_OT_word_set(_CorrectsSound, Operator):
-    """Write what is said instead of the chosen word: it is spelled anew within the word's time"""
+    """Replace the chosen word; its sounds are found again within the time of the word"""
 
     bl_idname = "risorius.word_set"
     bl_label = "Replace Word"
@@ -197,7 +197,7 @@ class RISORIUS_OT_word_set(_CorrectsSound, Operator):
 
 
 class RISORIUS_OT_speech_markers(_Corrects, Operator):
-    """Show the sounds of the voice as markers of the timeline, or take the markers away"""
+    """Show the sounds of the voice as markers of the timeline, or remove the markers"""
 
     bl_idname = "risorius.speech_markers"
     bl_label = "Markers"
@@ -212,8 +212,7 @@ class RISORIUS_OT_speech_markers(_Corrects, Operator):
 
 
 class RISORIUS_OT_speech_update(_Corrects, Operator):
-    """Let the voice follow its markers: moved ones change when a sound begins, renamed ones which \
-it is, copied ones insert it, deleted ones remove it"""
+    """Update the sounds of the voice from its moved, renamed, copied and deleted markers"""
 
     bl_idname = "risorius.speech_update"
     bl_label = "Update Speech"

@@ -38,7 +38,8 @@ class RISORIUS_OT_install_speech(Operator):
 
 
 def offer(context: Context) -> None:
-    """Say in a menu beside the pointer what speech lacks, with the button that installs it."""
+    """Show a menu beside the pointer that names the missing package, with a button that installs
+    it."""
 
     def draw(menu: Menu, _context: Context) -> None:
         _draw_button(menu.layout)

@@ -31,7 +31,7 @@ _FADE = 0.1  # seconds in which a voice's layer comes and goes
 
 
 class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
-    """Let the active face say what is heard in a sound file; better with the words typed in"""
+    """Let the active face speak a sound file; typed words make it better"""
 
     bl_idname = "risorius.speak"
     bl_label = "Speak from Audio"
@@ -41,23 +41,25 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         default=";".join(f"*{e}" for e in SOUNDS), options={"HIDDEN"}
     )
     transcript: bpy.props.StringProperty(
-        name="Transcript", description="What is said, in English; empty: listen for it"
+        name="Transcript", description="Spoken words in English; empty: recognise them"
     )
     transcript_text: bpy.props.StringProperty(
         name="Text", description="A text of this file that holds the transcript"
     )
     intensity: bpy.props.FloatProperty(
-        name="Intensity", description="Of mouth and brows", default=1.0, min=0.0, max=4.0
+        name="Intensity", description="Strength of mouth and brows", default=1.0, min=0.0, max=4.0
     )
-    seed: bpy.props.IntProperty(name="Seed", description="Of the blinks")
+    seed: bpy.props.IntProperty(name="Seed", description="Seed of the blinks")
     use_blinks: bpy.props.BoolProperty(name="Blinks", default=True)
     use_accents: bpy.props.BoolProperty(
-        name="Accents", description="Brows and head follow what is stressed", default=True
+        name="Accents", description="Move brows and head with stressed words", default=True
     )
     use_own_visemes: bpy.props.BoolProperty(
         name="Visemes of the Face",
-        description="Mouths of the expressions beside its DNA file, or of the library of the "
-        "preferences, where they are there; off: those of Risorius",
+        description=(
+            "Use visemes of the expressions beside the DNA file or of the "
+            "library, if they exist; off: visemes of Risorius"
+        ),
         default=True,
     )
     use_whole_frames: bpy.props.BoolProperty(
@@ -72,8 +74,10 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
     )
     tolerance: bpy.props.FloatProperty(
         name="Tolerance",
-        description="How far a slider may be from the voice's curve at any frame, where keys are "
-        "few; the range of a slider is 1",
+        description=(
+            "Largest distance of a slider from the computed curve at any "
+            "frame; the range of a slider is 1"
+        ),
         default=TOLERANCE,
         min=0.0005,
         max=0.1,
@@ -131,7 +135,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return words.say("Speech was cancelled.")
 
     def finish(self, context: Context) -> Result:
-        """Put what was made onto the face. It may have gone while the thread worked."""
+        """Put the result onto the face, which may have been deleted meanwhile."""
         task = self._task
         try:
             if task.result is None:
@@ -162,7 +166,7 @@ class RISORIUS_OT_speak(RunsBeside, PlacesClip, Operator, ImportHelper):
         return clip_actions.timing_of(clip, context.scene, self.start, keep_clock=True, whole=whole)
 
     def layer_settings(self, context: Context) -> dict[str, object]:
-        """A voice has the face while it sounds, and gives it back; a hand's layer would hold on."""
+        """Settings of a voice's layer: it moves the face only while it sounds."""
         fade = round(_FADE * clip_actions.frame_rate(context.scene))
         return {"extend": "NOTHING", "fade_in": float(fade), "fade_out": float(fade)}
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Speech: what the voice of a face says, sound by sound, to be corrected."""
+"""The panel Speech: the sounds of a face's voice, for correction."""
 
 from ... import native
 from ...scene.speech import spoken_keys, spoken_markers, spoken_properties, voices

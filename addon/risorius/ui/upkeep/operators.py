@@ -23,22 +23,20 @@ SHAPES = (
 
 
 def override_trouble(rig: ArmatureObject | None) -> str:
-    """Why a face that is an override stands still; empty for all others, and for None."""
+    """The reason why an override face does not move; empty for all others and for None."""
     if rig is None or not rig.override_library:
         return ""
     return library_overrides.trouble(rig)
 
 
 class RISORIUS_OT_make_override(Operator):
-    """Make a linked face, or an override of one that stands still, ready to animate"""
+    """Make a linked face or its override ready to animate"""
 
     bl_idname = "risorius.make_override"
     bl_label = "Make Override"
     bl_options = {"REGISTER", "UNDO"}
 
-    shapes: bpy.props.EnumProperty(
-        name="Shapes", description="How its shapes are moved", items=SHAPES
-    )
+    shapes: bpy.props.EnumProperty(name="Shapes", description="Mode of its shapes", items=SHAPES)
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -74,7 +72,7 @@ class RISORIUS_OT_make_override(Operator):
 
 
 class RISORIUS_OT_bring_back(Operator):
-    """Put deleted parts of the active face, which are still in the file, back into the scene"""
+    """Restore deleted parts of the active face that are still in the file"""
 
     bl_idname = "risorius.bring_back"
     bl_label = "Bring Back Deleted Parts"

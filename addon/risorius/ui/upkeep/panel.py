@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Words and buttons of the panel Face for what keeps a face from moving."""
+"""Sentences and buttons of the panel Face about problems that keep a face from moving."""
 
 from ...scene.base import parts
 from ...scene.upkeep import applied_transforms, library_overrides, migrations, repair
@@ -9,14 +9,14 @@ from .operators import RISORIUS_OT_bring_back, RISORIUS_OT_make_override, overri
 
 
 def draw_trouble(layout: UILayout, context: Context) -> bool:
-    """Words and buttons for what keeps the active face from moving.
+    """Draw sentences and buttons about problems that keep the active face from moving.
 
     Args:
         layout: of the panel.
         context: has the active object.
 
     Returns:
-        Whether the panel need not say anything more.
+        Whether the panel is complete with this.
     """
     linked, active = library_overrides.linked_rig(context), parts.active_rig(context)
     shown = linked or active

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Animation in time: clips and their files, layers that are mixed, reactions, idle life."""
+"""Animation over time: clips and their files, mixed layers, reactions, idle life."""

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Control animation: named curves over time, for any character whose rig has controls so named;
-.rzc files of them, read as a whole or in parts."""
+"""Control animation: named curves over time, for any character whose rig has these controls; and
+.rzc files of clips, read as a whole or in parts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..base.budget import BYTES_PER_BYTE, Budget, BudgetError
 from ..base.errors import ArgumentError
 
 _AT_ONCE = 4096  # frames
-# What may be read at once however small the file: 75 minutes of 1,000 controls that stand still.
+# Limit for one read, even of a small file: 75 minutes of 1,000 controls at rest.
 MOST_BYTES = 1 << 30
 
 Floats = npt.NDArray[np.float32]
@@ -25,7 +25,7 @@ Times = npt.NDArray[np.float64]
 
 
 class Event(NamedTuple):
-    """Something that happens at a time of a clip: a word, a note, a reaction to fire."""
+    """An event at a time of a clip: a word, a note, a reaction to fire."""
 
     time: float
     """Seconds, on the clip's own clock."""
@@ -38,20 +38,20 @@ class Event(NamedTuple):
 class Clip:
     """Curves of named controls.
 
-    A clip knows nothing of a rig: it plays on every character that has controls of its names, at
-    every LOD. It is a value: what changes a clip returns another one.
+    A clip does not refer to a rig: it plays on every character that has controls with its names, at
+    every LOD. A clip is immutable: operations return a new clip.
 
     Attributes:
-        names: the controls, each once; as a DNA spells its raw controls, or anything else that a
-            curve may be named after.
-        curves: float32[controls, frames], contiguous and read-only. Bit for bit what was given:
-            NaN, -0 and denormals included.
-        rate: frames per second. Of a clip with times of its own it is what tools should offer.
+        names: the controls, each once, usually in the spelling of a DNA's raw controls.
+        curves: float32[controls, frames], contiguous and read-only. All bits are kept, including
+            NaN, -0 and denormals.
+        rate: frames per second. For a clip with individual times it is the rate that tools should
+            offer.
         start: seconds, the time of the first frame.
-        times: float64[frames] in seconds, strictly ascending, or None: frame i is then at
-            start + i / rate.
+        times: float64[frames] in seconds, strictly ascending, or None: then frame i is at start + i
+            / rate.
         events: by ascending time.
-        metadata: what is worth knowing of the clip: its source, take, actor.
+        metadata: facts about the clip, such as source, take and actor.
     """
 
     def __init__(
@@ -65,11 +65,11 @@ class Clip:
         events: Iterable[Event] = (),
         metadata: Mapping[str, str] | None = None,
     ) -> None:
-        """Take a copy of what is given.
+        """Copy the arguments.
 
         Raises:
-            ValueError: a name twice, another shape, a rate that is not above 0, times that do not
-                ascend; the sentence says which.
+            ValueError: a repeated name, a wrong shape, a rate that is not above 0, times that do
+                not ascend; the sentence says which.
         """
         self.names: tuple[str, ...] = tuple(names)
         self.curves: Floats = _frozen(np.array(curves, np.float32, order="C"))
@@ -129,7 +129,7 @@ class Clip:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last; 0 of a single frame."""
+        """Seconds from the first frame to the last; 0 for a single frame."""
         if self.frame_count < 2:
             return 0.0
         if self.times is not None:
@@ -150,13 +150,13 @@ class Clip:
         return name in self._index
 
     def sample(self, times: npt.ArrayLike) -> Floats:
-        """The curves at any times: straight lines between frames, held before and after.
+        """The curves at any times: linear between frames, constant before and after.
 
         Args:
             times: seconds, [n], on the clip's own clock.
 
         Returns:
-            float32[n, controls]. A time that is a frame's gives its very bits.
+            float32[n, controls]. The time of a frame gives exactly its bits.
         """
         wanted = np.atleast_1d(np.asarray(times, np.float64))
         count = self.frame_count
@@ -166,9 +166,10 @@ class Clip:
             place = np.interp(wanted, self.times, np.arange(count, dtype=np.float64))
         else:
             place = np.clip((wanted - self.start) * self.rate, 0.0, count - 1.0)
-            near = np.rint(place)  # the division rounds; the time of a frame has to give that frame
+            # The division rounds, but the time of a frame must give that frame.
+            near = np.rint(place)
             place = np.where(np.abs(place - near) < 1e-9 * np.maximum(near, 1.0), near, place)
-        place = np.nan_to_num(place, nan=0.0)  # a time that is no number is the first frame's
+        place = np.nan_to_num(place, nan=0.0)  # NaN counts as the time of the first frame
         first = np.minimum(place.astype(np.int64), count - 1)
         part = (place - first).astype(np.float32)[:, None]
         here = self.curves[:, first].T
@@ -176,17 +177,17 @@ class Clip:
         return np.where(part == 0.0, here, here + (following - here) * part)
 
     def resampled(self, rate: float) -> Clip:
-        """The clip with frames `rate` a second, from its start to its end.
+        """The clip with `rate` frames per second, from its start to its end.
 
         Raises:
-            BudgetError: frames far apart would become more than a clip of this size can be worth.
+            BudgetError: frames far apart would become more than a clip of this size may need.
         """
         count = self._even_count(rate, 1e-6)
         times = self.start + np.arange(count) / rate
         return self.replaced(curves=self._sampled(times), rate=rate, times=None)
 
     def without_gaps(self) -> Clip:
-        """The clip with even frames at its own rate from its first frame on.
+        """The clip with evenly spaced frames at its own rate, from its first frame on.
 
         Raises:
             BudgetError: as resampled.
@@ -197,7 +198,7 @@ class Clip:
         return self.replaced(curves=curves, start=start, times=None)
 
     def _even_count(self, rate: float, rounding: float) -> int:
-        """Frames from the first to the last at a rate, if that many can be held."""
+        """The number of frames from the first to the last at a rate, if they fit the budget."""
         frames = self.duration * rate
         budget = Budget.of(self.curves.nbytes + 8 * self.frame_count)
         each = 4 * len(self.names) + 8  # float32 of each control, and a time
@@ -210,7 +211,7 @@ class Clip:
         return int(np.floor(frames + rounding)) + 1 if self.frame_count else 0
 
     def _longest_step(self) -> str:
-        """Where most of the clip's time goes, e.g. "frame 1 comes 9 s after frame 0 at 2 s"."""
+        """The longest gap of the clip, e.g. "frame 1 comes 9 s after frame 0 at 2 s"."""
         if self.times is None:
             return f"the clip has {self.frame_count:,} frames at {self.rate:g} a second"
         frame = int(np.argmax(np.diff(self.times)))
@@ -218,7 +219,7 @@ class Clip:
         return f"frame {frame + 1} comes {step:g} s after frame {frame} at {self.times[frame]:g} s"
 
     def _sampled(self, times: Times) -> Floats:
-        """float32[controls, times]; some thousand at a time, so that it takes little more."""
+        """float32[controls, times]; in blocks of frames, to save memory."""
         out = np.empty((len(self.names), times.size), np.float32)
         for first in range(0, times.size, _AT_ONCE):
             part = slice(first, first + _AT_ONCE)
@@ -226,12 +227,12 @@ class Clip:
         return out
 
     def selected(self, names: Sequence[str]) -> Clip:
-        """The clip of these controls only, in this order. Raises: KeyError."""
+        """The clip with only these controls, in this order. Raises: KeyError."""
         rows = [self._index[name] for name in names]
         return self.replaced(names=names, curves=self.curves[rows])
 
     def replaced(self, **changes: object) -> Clip:
-        """The clip with other values for some of its attributes (names, curves, rate, start, times,
+        """The clip with other values for some attributes (names, curves, rate, start, times,
         events, metadata)."""
         values: dict[str, object] = {
             "names": self.names,
@@ -248,7 +249,7 @@ class Clip:
         return Clip(**{**values, **changes})  # type: ignore[arg-type]
 
     def to_bytes(self) -> bytes:
-        """The clip as the bytes of a .rzc file: no bit of it is lost."""
+        """The clip as the bytes of a .rzc file, lossless."""
         return encode_clip(
             self.names,
             self.curves,
@@ -260,7 +261,7 @@ class Clip:
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the clip to a .rzc file; a file of that name from before is replaced as a whole.
+        """Write the clip to a .rzc file, replacing an existing file.
 
         Raises:
             ClipError: the file cannot be written.
@@ -277,25 +278,25 @@ class Clip:
         """Read a .rzc file, or some of its frames or controls.
 
         Args:
-            source: path, or the bytes of such a file.
-            frames: first and end (not included), from 0; None: all.
-            controls: names of curves, in the order wanted; None: all.
+            source: a path, or the bytes of a .rzc file.
+            frames: first and end (exclusive), from 0; None: all.
+            controls: names of curves, in the wanted order; None: all.
 
         Raises:
-            ClipError: no .rzc file, cut, damaged, of another version; or it cannot be opened.
-            KeyError: a control that is not there.
+            ClipError: not a .rzc file, cut, damaged, of another version, or it cannot be opened.
+            KeyError: an unknown control.
         """
         return ClipReader(source).read(frames, controls)
 
     def raw_controls(self, rig_names: Sequence[str]) -> tuple[Floats, list[str]]:
-        """What a rig is to be evaluated with.
+        """The curves as input of a rig.
 
         Args:
             rig_names: `Rig.raw_control_names`.
 
         Returns:
-            float32[frames, rig_names], 0 where the clip has no curve, ready for
-            `Rig.evaluate_batch`; and the names of the clip that the rig does not have.
+            float32[frames, rig_names], 0 for controls without a curve, for `Rig.evaluate_batch`;
+            and the names of curves that the rig lacks.
         """
         index = {name: i for i, name in enumerate(rig_names)}
         raw = np.zeros((self.frame_count, len(rig_names)), np.float32)
@@ -309,17 +310,18 @@ class Clip:
 
 
 class ClipReader:
-    """A .rzc file of which one reads what one needs. Frames are decoded in blocks, and the block
-    read last is kept compressed: to play, read some hundred frames at a time.
+    """A .rzc file that is read in parts. Frames are decoded in blocks, and the last block stays in
+    memory compressed: for playing, read a few hundred frames at a time.
 
     Attributes:
         names: the controls.
-        rate, start: as of a Clip.
-        has_times: the frames have times of their own.
+        rate, start: as in a Clip.
+        has_times: the frames have individual times.
         frame_count: frames in the file.
-        byte_count: bytes of the file that hold them; fewer than it has only after a recovery.
+        byte_count: bytes of the file that belong to the clip; smaller than the file only after a
+            recovery.
         block_starts: the first frame of each block, and the frame behind the last.
-        events, metadata: as of a Clip.
+        events, metadata: as in a Clip.
     """
 
     def __init__(self, source: str | os.PathLike[str] | bytes, *, recover: bool = False) -> None:
@@ -327,11 +329,11 @@ class ClipReader:
 
         Args:
             source: a path, or the bytes of a file.
-            recover: take also a file that was cut while it was recorded, up to its last whole
+            recover: also accept a file that was cut during recording, up to its last complete
                 block.
 
         Raises:
-            ClipError: no .rzc file, cut, damaged, of another version; or it cannot be opened.
+            ClipError: not a .rzc file, cut, damaged, of another version, or it cannot be opened.
         """
         if isinstance(source, bytearray | memoryview):
             source = bytes(source)
@@ -360,13 +362,13 @@ class ClipReader:
         """Frames begin to end - 1 of some controls, or of all.
 
         Returns:
-            A clip that starts when its first frame does. It has those events whose time it spans;
-            the whole clip has all.
+            A clip that starts at the time of its first frame. It has the events within its time
+            span; the whole clip has all events.
 
         Raises:
-            ClipError: frames that are not there, a damaged block, more at once than a file of this
-                size may take.
-            KeyError: a control that is not there.
+            ClipError: frames that do not exist, a damaged block, or more frames at once than a file
+                of this size may have.
+            KeyError: an unknown control.
         """
         begin, end = frames if frames is not None else (0, self.frame_count)
         if begin < 0 or end < begin or end > self.frame_count:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips as .rzc files, written while they are recorded."""
+"""Writes .rzc clips during recording."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from .clip import Event
 
 
 class ClipWriter:
-    """Records a clip: frames go to PATH.part as they come, and close() makes PATH of it. What is
-    not closed stays: `ClipReader(part, recover=True)` reads it up to the last whole block. Used
-    with `with`, it closes at the end, but not after an exception.
+    """Records a clip: frames go to PATH.part as they arrive, and close() renames it to PATH. If it
+    is not closed, the .part file stays: `ClipReader(part, recover=True)` reads it up to the last
+    complete block. As a context manager it closes at the end, but not after an exception.
 
         with ClipWriter("take.rzc", names, 60.0) as take:
             take.append(frames)
@@ -34,14 +34,15 @@ class ClipWriter:
         metadata: Mapping[str, str] | None = None,
         block_frames: int = 512,
     ) -> None:
-        """Open a file for names.
+        """Open a file for recording.
 
         Args:
-            has_times: each frame will come with its time.
-            block_frames: 1 to 4096. Few lose less when recording ends badly, many take less space.
+            has_times: each frame will have its own time.
+            block_frames: 1 to 4096. Small blocks lose less in a crash; large blocks take less
+                space.
 
         Raises:
-            ClipError: a name twice, a rate that is not above 0, a file that cannot be written.
+            ClipError: a repeated name, a rate that is not above 0, a file that cannot be written.
         """
         self.names: tuple[str, ...] = tuple(names)
         self.path = os.fspath(path)
@@ -57,7 +58,7 @@ class ClipWriter:
 
     @property
     def part(self) -> str:
-        """Where the frames are until the clip is closed."""
+        """The file that holds the frames until the clip is closed."""
         return os.fspath(self._file.part)
 
     @property
@@ -68,11 +69,11 @@ class ClipWriter:
         """Add frames.
 
         Args:
-            frames: float32[n, controls], or [controls] of one frame.
-            times: float64[n] in seconds, after those before, if the clip has times.
+            frames: float32[n, controls], or [controls] for one frame.
+            times: float64[n] in seconds, later than all before, if the clip has times.
 
         Raises:
-            ClipError: times that do not ascend, a closed clip, a disk that is full.
+            ClipError: times that do not ascend, a closed clip, a full disk.
             ValueError: another shape.
         """
         given = np.asarray(frames, np.float32)
@@ -82,11 +83,11 @@ class ClipWriter:
         self._file.append(given, own)
 
     def event(self, event: Event) -> None:
-        """Add an event; it is written with the frames that come next."""
+        """Add an event; it is written together with the next frames."""
         self._file.event(event)
 
     def close(self) -> None:
-        """Write what is left and give the file its name. Closing twice is closing once.
+        """Write the remaining frames and rename the file. Further calls have no effect.
 
         Raises:
             ClipError: the file cannot be written.

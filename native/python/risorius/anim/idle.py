@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Idle life from a seed: blinks, saccades with lids that follow, and movement one hardly sees.
+"""Idle life from a seed: blinks, saccades with following lids, and hardly visible movement.
 
-Chance comes from the raw bits of PCG64, which NumPy keeps as they are, and everything made of it
-from sums, products and quotients: the same blinks at the same times on every machine.
+Randomness comes from the raw bits of PCG64, which NumPy keeps stable, and the rest from sums,
+products and quotients: the same blinks at the same times on every machine.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ MICRO = {
     "mouthPressD": (0.05, 2.9),
 }
 MICRO_JAW = ("jawOpen", 0.018, 1.5)
-# Directions of saccades and how often they are taken: up, down and the sides about twice as often
-# as between them (Lee, Badler & Badler 2002, Eyes Alive, table of measured directions).
+# Directions of saccades and their frequencies: up, down and the sides about twice as often as
+# diagonals (Lee, Badler & Badler 2002, Eyes Alive, table of measured directions).
 _DIAGONAL = 0.70710678
 _DIRECTIONS = (
     (0.16, 1.0, 0.0),
@@ -52,17 +52,17 @@ _DIRECTIONS = (
 
 @dataclass(frozen=True)
 class Life:
-    """How a face lives.
+    """Parameters of idle life.
 
     Attributes:
-        blinks_per_minute: without the doubles and those that come with large saccades, some 2 a
+        blinks_per_minute: without double blinks and blinks of large saccades, which add about 2 a
             minute. People have 17 at rest, 26 in talk, 4.5 when reading (Bentivoglio et al. 1997).
-        double_blinks: the share of blinks that another follows at once.
-        gaze: scales how far the eyes wander; 0 leaves them straight ahead.
-        look_degrees: what eyeLookLeft/Right and eyeLookUp/Down at 1 turn an eye by.
-        lid_follow: how much of a blink the upper lid follows a full look down with, beyond what the
-            character's own look controls do.
-        micro: scales the movement at rest of brows, lids, nostrils, mouth and jaw.
+        double_blinks: share of blinks that are followed by another one at once.
+        gaze: scales how far the eyes wander; at 0 they look straight ahead.
+        look_degrees: rotation of an eye by eyeLookLeft/Right and eyeLookUp/Down at 1.
+        lid_follow: share of a blink by which the upper lid follows a full look down, in addition to
+            the character's own look controls.
+        micro: scales the movement of brows, lids, nostrils, mouth and jaw at rest.
     """
 
     blinks_per_minute: float = 15.0
@@ -74,7 +74,7 @@ class Life:
 
 
 class Blink(NamedTuple):
-    """Seconds and how far the lids close, in [0, 1]."""
+    """Times in seconds, and the closing of the lids in [0, 1]."""
 
     start: float
     close: float
@@ -82,7 +82,7 @@ class Blink(NamedTuple):
     open: float
     amount: float
     late: float
-    """Seconds that the right lid is behind the left."""
+    """Seconds by which the right lid lags behind the left."""
 
     @property
     def end(self) -> float:
@@ -90,7 +90,7 @@ class Blink(NamedTuple):
 
 
 class Saccade(NamedTuple):
-    """A jump of both eyes; angles in degrees, to the face's own left and up."""
+    """A jump of both eyes; angles in degrees, towards the face's own left and up."""
 
     start: float
     duration: float
@@ -107,16 +107,16 @@ def idle(
     loop: bool = False,
     life: Life | None = None,
 ) -> Clip:
-    """A clip of a face that rests: a layer under or over others.
+    """A clip of a face at rest, for a layer below or above others.
 
     Args:
-        seed: from 0; the same one gives the same clip.
+        seed: 0 or more; the same seed gives the same clip.
         duration: seconds.
-        rate: frames a second.
+        rate: frames per second.
         start: seconds, the time of the first frame.
-        loop: the last frame is the first again, for Layer(extend="repeat"); under half a minute
-            one sees it.
-        life: how it lives.
+        loop: make the last frame equal the first, for Layer(extend="repeat"); a loop under half a
+            minute is noticeable.
+        life: parameters of the movement.
 
     Returns:
         A clip of raw controls, values in [0, 1], with an event "idle.blink" for each blink.
@@ -125,12 +125,12 @@ def idle(
         ValueError: a seed below 0, a duration or rate that is not above 0, a loop below 2 s.
 
     From:
-        Blinks: intervals spread log-normally (Cruz et al. 2011); lids fall in 50 to 78 ms and rise
-        in more than twice that time (Evinger, Manning & Sibony 1991). Saccades: duration 21 ms and
-        2.2 ms a degree (Bahill, Clark & Stark 1975; Carpenter 1988), position of least jerk, sizes
-        and directions about as in Eyes Alive (Lee, Badler & Badler 2002); large ones bring blinks
-        (Evinger et al. 1994); small ones while fixating (Martinez-Conde et al. 2004). The upper
-        lid follows the eye up and down (Becker & Fuchs 1988).
+        Blinks: log-normal intervals (Cruz et al. 2011); lids fall in 50 to 78 ms and rise in more
+        than twice that time (Evinger, Manning & Sibony 1991). Saccades: duration 21 ms plus 2.2 ms
+        per degree (Bahill, Clark & Stark 1975; Carpenter 1988), minimum jerk, sizes and directions
+        similar to Eyes Alive (Lee, Badler & Badler 2002); large ones trigger blinks (Evinger et al.
+        1994); small ones occur during fixation (Martinez-Conde et al. 2004). The upper lid follows
+        the eye up and down (Becker & Fuchs 1988).
     """
     life = life or Life()
     if seed < 0:
@@ -171,7 +171,7 @@ class _Dice:
         return low + (high - low) * ((int(self._bits.random_raw()) >> 11) * 2.0**-53)
 
     def normal(self) -> float:
-        """Nearly: the sum of twelve, which needs no logarithm."""
+        """Approximately normal: the sum of twelve uniform numbers, which needs no logarithm."""
         total = -6.0
         for _ in range(12):
             total += self.uniform()
@@ -182,7 +182,7 @@ class _Dice:
 
 
 def _exp(x: float) -> float:
-    """e to the x within 0.5 % for |x| below 3, the same bits everywhere."""
+    """e to the power of x within 0.5 % for |x| below 3, with the same bits everywhere."""
     value = 1.0 + x / 1024.0
     for _ in range(10):
         value *= value
@@ -195,14 +195,14 @@ def _exp(x: float) -> float:
 def make_blinks(
     seed: int, length: float, life: Life, loop: bool, saccades: list[Saccade]
 ) -> list[Blink]:
-    """Blinks by ascending start, none during another.
+    """Blinks by ascending start; they do not overlap.
 
     Args:
-        seed: 0 or more; the same one gives the same blinks.
+        seed: 0 or more; the same seed gives the same blinks.
         length: seconds to fill.
-        life: how often.
-        loop: the end is to fit the beginning, so the eyes are open at both.
-        saccades: of the same face; some of the large ones bring a blink.
+        life: their frequency.
+        loop: the end must fit the beginning, so the eyes are open at both.
+        saccades: saccades of the same face; some of the large ones trigger a blink.
     """
     dice = _Dice(seed, 1)
     wanted = []
@@ -239,7 +239,8 @@ def _blink(dice: _Dice, start: float) -> Blink:
 
 
 def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
-    """How far a blink closes the left lid at times, in [0, 1]: down fast, up slower and slower."""
+    """The closing of the left lid by a blink at times, in [0, 1]: down fast, up slower and
+    slower."""
     t = np.asarray(times, np.float64) - blink.start
     up = np.clip((t - blink.close - blink.hold) / blink.open, 0.0, 1.0)
     down, back = smooth_step(t / blink.close), smooth_step(up * (2.0 - up))
@@ -249,7 +250,7 @@ def lid(blink: Blink, times: npt.ArrayLike) -> Doubles:
 def _close_lids(
     curves: dict[str, Doubles], times: Doubles, blinks: list[Blink], life: Life
 ) -> None:
-    """Blinks and the lids' following of the gaze, joined softly."""
+    """Combine blinks smoothly with lids that follow the gaze."""
     for side, sign in (("L", 0.0), ("R", 1.0)):
         closed = np.zeros(times.size)
         for blink in blinks:
@@ -267,23 +268,23 @@ def _close_lids(
 
 
 def make_saccades(seed: int, length: float, life: Life, loop: bool) -> list[Saccade]:
-    """Saccades by ascending start, each from where the last one ended.
+    """Saccades by ascending start; each begins where the last one ended.
 
     Args:
-        seed: 0 or more; the same one gives the same saccades.
+        seed: 0 or more; the same seed gives the same saccades.
         length: seconds to fill.
-        life: how far the gaze wanders; at a gaze of 0 there are none.
-        loop: the last one ends where the first one began.
+        life: the range of the gaze; with a gaze of 0 there are none.
+        loop: the last one ends at the start of the first one.
     """
     if life.gaze == 0.0:
         return []
     dice = _Dice(seed, 2)
     out: list[Saccade] = []
-    gaze, place = (0.0, 0.0), (0.0, 0.0)  # where the eyes are, and what they rest on
+    gaze, place = (0.0, 0.0), (0.0, 0.0)  # direction of the eyes, and the fixated point
     end = length - 0.4 if loop else length
     time = dice.uniform(0.2, 0.8)
     while time < end:
-        if dice.uniform() < 0.45:  # a small one, within the fixation
+        if dice.uniform() < 0.45:  # a small one during a fixation
             after = _beside(dice, place, 0.35)
             pause = dice.lognormal(0.5, 0.5)
         else:
@@ -314,7 +315,7 @@ def _beside(dice: _Dice, place: tuple[float, float], degrees: float) -> tuple[fl
 
 
 def _next_place(dice: _Dice, place: tuple[float, float], scale: float) -> tuple[float, float]:
-    """Back to the middle, most often, when away; else somewhere, the farther the less often."""
+    """Mostly back to the middle when away from it; otherwise anywhere, far places less often."""
     if abs(place[0]) + abs(place[1]) > 4.0 * scale and dice.uniform() < 0.7:
         return (scale * dice.uniform(-1.2, 1.2), scale * dice.uniform(-0.8, 0.8))
     size = min(dice.lognormal(4.5, 0.7), 22.0) * scale
@@ -354,7 +355,7 @@ def _gaze_curves(times: Doubles, saccades: list[Saccade], life: Life) -> dict[st
 
 
 def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[str, Doubles]:
-    """Both sides share most of it, as both halves of a face do."""
+    """Both sides share most of the movement, like the two halves of a face."""
     out = {}
     for stream, (name, (amount, step)) in enumerate(MICRO.items()):
         common, left, right = (
@@ -368,13 +369,13 @@ def _micro_curves(seed: int, times: Doubles, scale: float, loop: bool) -> dict[s
 
 
 def _raised(noise: Doubles) -> Doubles:
-    """[-1, 1] to [0, 1], mostly low, without a corner."""
+    """[-1, 1] to [0, 1], mostly low, without a kink."""
     half = 0.5 + 0.5 * noise
     return half * half
 
 
 def _noise(dice: _Dice, times: Doubles, step: float, loop: bool) -> Doubles:
-    """In [-1, 1]: two octaves of cubic B-splines over chance, slow and without a period."""
+    """In [-1, 1]: two octaves of cubic B-splines over random numbers, slow and without a period."""
     return 0.8 * _spline(dice, times, step, loop) + 0.2 * _spline(dice, times, 0.36 * step, loop)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layers of clips and poses, reactions and exclusive controls: what a face's controls are when."""
+"""Mixes layers of clips and poses, reactions and exclusive controls to the controls of a face."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ from .reactions import Exclusives, Reaction, load_exclusives, load_reactions
 Floats = npt.NDArray[np.float32]
 Points = tuple[npt.ArrayLike, npt.ArrayLike]
 
-# Curves of these are rotations in radians, and not limited to [0, 1].
+# Curves with these prefixes are rotations in radians and not limited to [0, 1].
 _ROTATIONS = ("head.", "neck.", "eyeL.", "eyeR.")
 _NO_POINTS = (np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """One layer of a Mixer. Times in seconds, of the scene unless it says clip.
+    """One layer of a Mixer. Times are in seconds of the scene, unless they are called clip times.
 
     Attributes:
         source: a Clip; a pose as {control: value}; or the name of an expression.
         name: for people.
-        blend: "override" goes over to the layer's value by its weight (Blender: Replace),
-            "additive" adds weight * value (Blender: Add), "max" goes over to the higher of the
-            two.
-        weight: in [0, 1]; or (times, values), straight lines between, held outside.
+        blend: "override" blends to the layer's value by its weight (Blender: Replace), "additive"
+            adds weight * value (Blender: Add), "max" blends to the higher of the two values.
+        weight: in [0, 1]; or (times, values), linear between, constant outside.
         mask: {region, control or pattern: weight}, see regions.mask; or float[controls] in [0, 1];
-            None is all of it. Controls that the source has no curve of are never touched.
-        start: when the clip (or its clip_range) begins, by default on its own clock; when a pose
-            begins, by default always there.
-        end: of a pose only; a clip ends by its length, scale and repeat.
-        clip_range: (first, last) in clip time: the part that is played, by default all.
+            None: everything. Controls without a curve in the source are never changed.
+        start: start of the clip (or its clip_range), by default by the clip's own times; start of a
+            pose, by default always.
+        end: for a pose only; the end of a clip follows from its length, scale and repeat.
+        clip_range: (first, last) in clip time: the part to play, by default all.
         scale: 2 plays half as fast.
-        repeat: how often the part is played one after the other; need not be whole.
+        repeat: number of times the part is played; need not be an integer.
         reverse: plays it backwards.
-        warp: (scene times, clip times), straight lines between: instead of start, end, clip_range,
-            scale, repeat and reverse. The layer lasts from the first to the last scene time; clip
-            times that fall play backwards.
+        warp: (scene times, clip times), linear between; it replaces start, end, clip_range, scale,
+            repeat and reverse. The layer lasts from the first to the last scene time; descending
+            clip times play backwards.
         extend: before its start and after its end the layer may "hold", "hold_forward" (only after
-            its end), be "nothing", or "repeat" for ever both ways.
-        fade_in: seconds from nothing to full weight at its start, in a straight line.
-        fade_out: the same at its end. Held after a fade out it is nothing, as in Blender.
+            its end), be "nothing", or "repeat" for ever in both directions.
+        fade_in: seconds of a linear increase from 0 to full weight at its start.
+        fade_out: the same at its end. A layer that is held after a fade-out has weight 0, as in
+            Blender.
         mute: leave it out.
-        solo: where any layer has it, only those that have it play.
+        solo: if any layer has it, only layers with it play.
     """
 
     source: Clip | Mapping[str, float] | str
@@ -77,10 +77,10 @@ class Layer:
     solo: bool = False
 
     def clip(self) -> Clip:
-        """The source as a clip; a pose is one of a single frame.
+        """The source as a clip; a pose becomes a clip of a single frame.
 
         Raises:
-            ValueError: an expression of that name is not known.
+            ValueError: an unknown expression.
         """
         if isinstance(self.source, Clip):
             return self.source
@@ -91,14 +91,15 @@ class Layer:
 
 
 class Mixer:
-    """Layers, reactions and rules of one face -> its controls at a time.
+    """Mixes layers, reactions and rules of one face to its controls at a time.
 
-    A function of the time, the layers, and what was fired: any frame alone gives the same. Its
-    arithmetic is written down in native/clip/mixer/mixer.h; layers equal Blender's NLA.
+    The result depends only on the time, the layers, and the fired reactions, so that any frame can
+    be evaluated alone. native/clip/mixer/mixer.h documents the arithmetic; layers behave like
+    Blender's NLA.
 
     Attributes:
-        names: the controls, in the order of what evaluate gives.
-        reactions: by name, what fire can fire.
+        names: the controls, in the order of evaluate's result.
+        reactions: by name, for fire.
     """
 
     def __init__(
@@ -116,16 +117,16 @@ class Mixer:
         Args:
             names: e.g. Rig.raw_control_names; each once.
             layers: bottom to top.
-            ranges: what values are clamped to, {name: (low, high)} or float[names, 2]; the others
-                [0, 1], rotations of head and eyes ("head.yaw" ...) not at all.
-            exclusives: rules of controls that exclude each other: None, "default", or the path of
-                a TOML file such as risorius/anim/exclusives.toml, or what load_exclusives gave.
-            reactions: what can be fired; by default load_reactions().
-            max_fired: firings that are remembered; when there are more, the one that ended first
-                is forgotten.
+            ranges: limits of the values, {name: (low, high)} or float[names, 2]. Default: [0, 1],
+                and no limits for rotations of head and eyes ("head.yaw" ...).
+            exclusives: rules of controls that exclude each other: None, "default", the path of a
+                TOML file such as risorius/anim/exclusives.toml, or the result of load_exclusives.
+            reactions: available reactions; by default load_reactions().
+            max_fired: number of remembered firings; a new one then replaces the one that ended
+                first.
 
         Raises:
-            ValueError: a sentence that names the layer or reaction and its field.
+            ValueError: the sentence names the layer or reaction and its field.
         """
         self.names = tuple(names)
         low, high = _limits(self.names, ranges)
@@ -143,7 +144,7 @@ class Mixer:
 
     @property
     def layers(self) -> tuple[Layer, ...]:
-        """Bottom to top. Assigned as a whole; a refused assignment changes nothing."""
+        """The layers, bottom to top. Assign a whole tuple; a refused assignment changes nothing."""
         return tuple(layer for layer, _ in self._layers)
 
     @layers.setter
@@ -151,10 +152,11 @@ class Mixer:
         self._set([(layer, self._curves(layer)) for layer in layers])
 
     def add(self, source: Layer | Clip | Mapping[str, float] | str, **settings: Any) -> int:
-        """Put a layer on top, e.g. add(clip, blend="additive"); its place, from 0 at the bottom.
+        """Put a layer on top, e.g. add(clip, blend="additive"). Returns its index, from 0 at the
+        bottom.
 
         Args:
-            source: a layer, or the source of a new one.
+            source: a layer, or the source of a new layer.
             settings: fields of Layer.
         """
         layer = source if isinstance(source, Layer) else Layer(source)
@@ -162,10 +164,10 @@ class Mixer:
         return len(self._layers) - 1
 
     def change(self, place: int, **settings: Any) -> None:
-        """Change settings of a layer: cheap, unless it is its source or mask.
+        """Change settings of a layer; fast unless source or mask change.
 
         Args:
-            place: of the layer, from 0 at the bottom.
+            place: index of the layer, from 0 at the bottom.
             settings: fields of Layer.
         """
         layers = list(self.layers)
@@ -179,15 +181,15 @@ class Mixer:
         self.layers = tuple(layers)
 
     def missing(self, place: int) -> list[str]:
-        """The names of a layer's curves that this mixer has no control for."""
+        """The names of a layer's curves without a control in this mixer."""
         known = set(self.names)
         return [name for name in self._layers[place][0].clip().names if name not in known]
 
     def fire(self, name: str, time: float, strength: float = 1.0) -> bool:
-        """Start a reaction at a time, over whatever runs.
+        """Start a reaction at a time, in addition to running ones.
 
-        Reactions join as 1 - (1 - a) * (1 - b): never beyond a control's limit, and firing one
-        again while it runs makes no step.
+        Reactions combine as 1 - (1 - a) * (1 - b): they never exceed a control's limit, and firing
+        a running reaction again causes no jump.
 
         Args:
             name: one of reactions.
@@ -195,10 +197,10 @@ class Mixer:
             strength: in [0, 1].
 
         Returns:
-            False, and nothing happens, when max_fired reactions have not ended by then.
+            False, and nothing happens, if max_fired reactions have not ended by then.
 
         Raises:
-            KeyError: no such reaction. ValueError: time or strength out of range.
+            KeyError: unknown reaction. ValueError: time or strength out of range.
         """
         if not (math.isfinite(time) and 0.0 <= strength <= 1.0):
             raise ArgumentError(
@@ -208,11 +210,11 @@ class Mixer:
         return self._core.fire(self._reaction_index[name], time, strength)
 
     def fire_events(self, events: Iterable[Event], offset: float = 0.0) -> int:
-        """Fire every event that bears a reaction's name; how many were fired.
+        """Fire every event with the name of a reaction; returns their number.
 
         Args:
-            events: of a clip; the value of one is the strength if it is a number.
-            offset: seconds that are added to the times of the events.
+            events: events of a clip; an event's value is the strength if it is a number.
+            offset: seconds added to the times of the events.
         """
         count = 0
         for event in events:
@@ -221,7 +223,7 @@ class Mixer:
         return count
 
     def clear_fired(self) -> None:
-        """Forget everything that was fired."""
+        """Forget all firings."""
         self._core.clear_fired()
 
     def evaluate(
@@ -231,8 +233,8 @@ class Mixer:
 
         Args:
             time: seconds, of the scene.
-            base: float32[names] below the lowest layer, e.g. what an animator set; 0 without.
-            out: a contiguous float32[names] to write into; may be base.
+            base: float32[names] below the lowest layer, e.g. an animator's values; default 0.
+            out: a contiguous float32[names] for the result; may be base.
 
         Returns:
             float32[names].
@@ -252,19 +254,19 @@ class Mixer:
         return self._core.evaluate_batch(times, base)
 
     def bake(self, start: float, end: float, rate: float = 60.0) -> Clip:
-        """What the mixer gives from start to end, as a clip of all its controls.
+        """The result of the mixer from start to end, as a clip of all its controls.
 
         Args:
             start: seconds, of the first frame.
-            end: seconds; the last frame is at it or less than a frame before it.
-            rate: frames a second.
+            end: seconds; the last frame is there, or less than one frame earlier.
+            rate: frames per second.
         """
         count = max(math.floor((end - start) * rate + 1e-6) + 1, 0)
         frames = self.evaluate_batch(start + np.arange(count) / rate)
         return Clip(self.names, frames.T, rate, start=start)
 
     def _curves(self, layer: Layer) -> LayerCurves:
-        """What was made for the same source and mask, or new."""
+        """The curves that were made for the same source and mask, or new ones."""
         for old, curves in self._layers:
             if old.source is layer.source and old.mask is layer.mask:
                 return curves
@@ -306,7 +308,7 @@ def _points(points: Points) -> Points:
 
 
 def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
-    """A layer as the native mixer takes it."""
+    """A layer in the form of the native mixer."""
     still = curves.frame_count < 2
     first, last = layer.clip_range or curves.range
     start, end = layer.start, layer.end
@@ -344,7 +346,7 @@ def _settings(place: int, layer: Layer, curves: LayerCurves) -> dict[str, Any]:
 
 
 def _strength(text: str) -> float:
-    """The number in [0, 1] that an event's value is, or 1."""
+    """The number in [0, 1] in an event's value, otherwise 1."""
     try:
         value = float(text)
     except ValueError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reactions that a Mixer fires and rules of controls that exclude each other, read from TOML."""
+"""Reactions that a Mixer fires, and rules of controls that exclude each other; read from TOML."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ _Yield = tuple[npt.NDArray[np.uint32], npt.NDArray[np.uint32], str, float]
 
 @dataclass(frozen=True)
 class ReactionPart:
-    """Controls that go the same way in time; see Reaction."""
+    """Controls that share one envelope; see Reaction."""
 
     weights: Mapping[str, float]
-    """By control, in [0, 1]: the share of the way to 1, or to its upper limit if that is less."""
+    """By control, in [0, 1]: share of the way to 1, or to its upper limit if that is lower."""
     delay: float = 0.0
-    """Seconds from the firing; so are the others."""
+    """Seconds after the firing; the other times are in seconds too."""
     attack: float = 0.1
     hold: float = 0.0
     release: float = 0.3
@@ -38,7 +38,7 @@ class ReactionPart:
 
 @dataclass(frozen=True)
 class Reaction:
-    """Something a face does by itself and takes back; up and down it goes x * x * (3 - 2 * x)."""
+    """A movement that ends by itself; it rises and falls along x * x * (3 - 2 * x)."""
 
     name: str
     parts: tuple[ReactionPart, ...]
@@ -51,7 +51,7 @@ class Reaction:
         return max((p.delay + p.attack + p.hold + p.release for p in self.parts), default=0.0)
 
     def parts_of(self, index: Index) -> list[_Part]:
-        """The parts as the native mixer takes them, without the controls that are not there."""
+        """The parts in the form of the native mixer, without unknown controls."""
         out = []
         for p in self.parts:
             there = {index[name]: weight for name, weight in p.weights.items() if name in index}
@@ -63,7 +63,7 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Yield:
-    """While `by` are on, `of` are taken down: of *= 1 - amount * measure(by)."""
+    """While `by` are on, `of` are reduced: of *= 1 - amount * measure(by)."""
 
     name: str
     by: tuple[str, ...]
@@ -79,10 +79,10 @@ class Exclusives:
 
     yields: tuple[Yield, ...] = ()
     opposites: tuple[tuple[str, str], ...] = field(default=())
-    """Pairs: what both have is taken from both."""
+    """Pairs; the common amount is subtracted from both."""
 
     def rules_of(self, index: Index) -> tuple[list[_Yield], list[tuple[int, int]]]:
-        """The rules as the native mixer takes them, without the controls that are not there."""
+        """The rules in the form of the native mixer, without unknown controls."""
 
         def there(names: tuple[str, ...]) -> npt.NDArray[np.uint32]:
             return np.array([index[name] for name in names if name in index], np.uint32)
@@ -96,7 +96,7 @@ def load_reactions(path: str | os.PathLike[str] | None = None) -> dict[str, Reac
     """Reactions by name, from a file such as risorius/anim/reactions.toml, which is the default.
 
     Raises:
-        ValueError: the file, what was found and what was expected.
+        ValueError: with the file, the found and the expected value.
     """
     table, where = _read(path, "reactions.toml")
     prefix = table.get("prefix", "")
@@ -108,7 +108,7 @@ def load_exclusives(path: str | os.PathLike[str] | None = None) -> Exclusives:
     """Rules from a file such as risorius/anim/exclusives.toml, which is the default.
 
     Raises:
-        ValueError: the file, what was found and what was expected.
+        ValueError: with the file, the found and the expected value.
     """
     table, where = _read(path, "exclusives.toml")
     prefix = table.get("prefix", "")
@@ -138,7 +138,7 @@ def _read(path: str | os.PathLike[str] | None, own: str) -> tuple[dict[str, Any]
 
 @cache
 def _own(file: str) -> dict[str, Any]:
-    """Read once: every new mixer asks for it."""
+    """The package's own table, read only once because every new mixer needs it."""
     text = resources.files(__package__).joinpath(file).read_text(encoding="utf-8")
     return toml.parse(text)
 

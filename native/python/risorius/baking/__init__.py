@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""A clip played on a face, and the poses written as .npz or .csv."""
+"""Plays a clip on a face and writes the poses as .npz or .csv."""

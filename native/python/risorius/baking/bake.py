@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A clip on a character, evaluated and written."""
+"""Evaluates a clip on a character and writes the result."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DEFAULT_PARTS = PARTS[:3]
 
 
 class Sink(Protocol):
-    """What takes the frames in their order."""
+    """Receives frames in their order."""
 
     def add(self, chunk: Chunk) -> None: ...
     def finish(self) -> None: ...
@@ -38,23 +38,23 @@ def bake(
     threads: int = 1,
     progress: Callable[[int], None] = lambda frame: None,
 ) -> dict[str, Any]:
-    """Evaluate every frame, in bounded memory, and write what is asked for, whole or not at all.
+    """Evaluate every frame in bounded memory, and write the requested files atomically.
 
     Args:
-        clip: already resampled and cut, see prepared.
-        face, lod: of whom.
-        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; none for the facts only. What
-            killed processes left beside them stays, see fileio.sweep.
-        parts: of PARTS, what the files shall hold.
-        compress: make an .npz smaller, and several times slower.
-        threads: that evaluate; 0 is all cores.
-        progress: called with the number of frames that are done.
+        clip: already resampled and cut, see `prepared`.
+        face, lod: the character and its LOD.
+        outputs: "npz", "csv" or "rzc" (the clip itself) -> path; empty for the facts only. Hidden
+            files of killed processes in these folders stay, see fileio.sweep.
+        parts: from PARTS, the content of the files.
+        compress: make the .npz smaller; several times slower.
+        threads: number of threads; 0: all cores.
+        progress: called with the number of finished frames.
 
     Returns:
-        The facts of Measure, and "evaluation_seconds", the time that the evaluator itself took.
+        The facts of Measure, and "evaluation_seconds", the time inside the evaluator.
 
     Raises:
-        ValueError: the character has no such LOD.
+        ValueError: the character lacks this LOD.
         OSError: a file cannot be written.
     """
     face.check_lod(lod)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips of a character's controls, from files of any kind that animation comes in."""
+"""Clips of a character's controls, from animation files of any kind."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ SUFFIX = ".rzc"
 
 @dataclass(frozen=True)
 class Performance:
-    """A clip as a character can play it.
+    """A clip prepared for a character.
 
     Attributes:
-        clip: curves of raw controls, some of which the character may not have.
-        mapping: name of the mapping that made them so; "" if the file's names are the controls'.
-        unmapped: curves of the file that are no control and that the mapping does not know.
+        clip: curves of raw controls; the character may lack some.
+        mapping: name of the mapping that was used; "" if the file's names are controls.
+        unmapped: curves of the file that are not controls and that the mapping does not know.
     """
 
     clip: risorius.Clip
@@ -33,15 +33,15 @@ class Performance:
 
 
 def load_performance(path: Path, face: Face, mapping: str | None = None) -> Performance:
-    """The clip of a file for a character.
+    """Load the clip of a file for a character.
 
     Args:
-        path: .rzc, or what risorius.importing reads.
-        face: whose raw controls are taken as they are, and whose table GUI controls go through.
-        mapping: a built-in one or a TOML file; None: the one that fits, none at all for .rzc.
+        path: a .rzc file, or a file that risorius.importing reads.
+        face: its raw controls are used directly, and its table converts GUI controls.
+        mapping: a built-in one or a TOML file; None: the fitting one, or none for .rzc.
 
     Raises:
-        OSError, ValueError: no animation, or none that can be mapped; names the file.
+        OSError, ValueError: not animation, or no mapping fits; the error names the file.
     """
     if path.suffix.lower() == SUFFIX:
         clip = risorius.Clip.load(path)
@@ -57,7 +57,7 @@ def load_performance(path: Path, face: Face, mapping: str | None = None) -> Perf
         others = tuple(name for name in found.clip.names if name not in own)
         return Performance(found.clip.selected(own), "", others)
     clip, report = found.apply(mapping, rig=face.rig)
-    # A mapping knows names of faces; a rig may have others, for a neck's rotation for instance.
+    # A mapping knows names of faces; a rig may have further controls, such as a neck's rotation.
     own = [name for name in own if name in report.unmapped and name not in clip]
     if own:
         curves = np.concatenate([clip.curves, found.clip.selected(own).curves])

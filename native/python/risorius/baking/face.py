@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A character as an animation is computed for it, and the clip made ready for it."""
+"""A character prepared for baking, and clips prepared for it."""
 
 from __future__ import annotations
 
@@ -31,36 +31,37 @@ FIELDS = {
     "maps": "animated_maps",
     "controls": "controls",
 }
-"""What users call the parts of a Pose -> its fields."""
+"""The users' names for parts of a Pose -> its fields."""
 _LAYERS = ("behavior", "machine_learned_behavior", "rbf_behavior", "twist_swing_behavior")
-_CHUNK_BYTES = 8 << 20  # poses that stay in a processor's cache are several times as fast to use
+# Bytes of poses per chunk: poses that stay in a processor's cache are several times faster to use.
+_CHUNK_BYTES = 8 << 20
 
 
 @dataclass(frozen=True)
 class Face:
-    """A compiled character with the names of all that a pose of it holds."""
+    """A compiled character with the names of all parts of its poses."""
 
     name: str
     rig: risorius.Rig
     names: dict[str, list[str]]
-    """By part: one for each joint, channel, map and control; each once in its list."""
+    """By part: a unique name for each joint, channel, map and control."""
     translation_unit: str
     rotation_unit: str
     psd_range: tuple[int, int]
-    """Of the correctives among the controls: first, end."""
+    """Range of the correctives among the controls: first, end."""
     turning: tuple[JointControl, ...] = ()
-    """Joints whose rotation raw controls hold."""
+    """Joints whose rotation is held by raw controls."""
     shares: Mapping[int, tuple[str, float]] = field(default_factory=dict)
-    """Joints that turn as neck and head, see turned_joints."""
+    """Joints that turn with neck and head, see turned_joints."""
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """What a joint's numbers are."""
+        """The names of a joint's numbers."""
         turn = ("qx", "qy", "qz", "qw") if self.rig.rotation == "quaternion" else ("rx", "ry", "rz")
         return ("tx", "ty", "tz", *turn, "sx", "sy", "sz")
 
     def rest(self, part: str) -> Floats:
-        """What a part is when nothing moves: float32[joints, columns] or [count]."""
+        """The rest values of a part: float32[joints, columns] or [count]."""
         if part == "joints":
             joint = np.array([name == "qw" for name in self.columns], np.float32)
             return np.tile(joint, (self.rig.joint_count, 1))
@@ -71,21 +72,21 @@ class Face:
         return rest
 
     def check_lod(self, lod: int) -> None:
-        """Raises: ValueError: the character has no such LOD."""
+        """Raises: ValueError: the character lacks this LOD."""
         last = max(1, self.rig.lod_count) - 1
         if not 0 <= lod <= last:
             raise ArgumentError(f"{self.name}: a LOD from 0 to {last} was expected, found {lod}")
 
 
 def load_face(path: Path, *, quaternions: bool = False) -> Face:
-    """The character of a DNA file, compiled or from this user's cache of compiled faces.
+    """The character of a DNA file, compiled or from the user's cache of compiled faces.
 
     Args:
-        path: of the DNA file.
-        quaternions: rotations of joints are quaternions; else Euler angles in the file's unit.
+        path: path of the DNA file.
+        quaternions: rotations of joints are quaternions, otherwise Euler angles in the file's unit.
 
     Raises:
-        DnaError: it is none.
+        DnaError: not a valid DNA file.
     """
     rig = risorius.compile_cached(path, rotation="quaternion" if quaternions else "euler")
     dna = risorius.load(path, layers=_LAYERS)
@@ -105,7 +106,8 @@ def load_face(path: Path, *, quaternions: bool = False) -> Face:
 
 
 def _each_once(names: list[str], count: int, kind: str) -> list[str]:
-    """Names of all things of a kind; one without a name or with another's gets its index."""
+    """Unique names of all objects of a kind; one without a name, or with a repeated one, gets its
+    index."""
     out: list[str] = []
     seen: set[str] = set()
     for index in range(count):
@@ -122,17 +124,17 @@ def prepared(
     rate: float | None = None,
     frames: tuple[int | None, int | None] = (None, None),
 ) -> risorius.Clip:
-    """The frames of a clip that are asked for, for a face that turns its head.
+    """The requested frames of a clip, for a face that turns its head.
 
     Args:
-        clip: any.
-        face: on which it plays, see with_head_turns.
-        rate: frames per second to resample it to; None leaves it as it is.
-        frames: first and end (not included), counted from 0 after resampling; what lies beyond the
-            clip's end is not there.
+        clip: any clip.
+        face: the character, see with_head_turns.
+        rate: resample to this number of frames per second; None: do not resample.
+        frames: first and end (exclusive), counted from 0 after resampling; frames beyond the clip's
+            end are ignored.
 
     Raises:
-        ValueError: no frame is left.
+        ValueError: no frame remains.
     """
     found = clip.frame_count
     if rate is not None:
@@ -146,19 +148,19 @@ def prepared(
             start=float(times[0]) if times.size else clip.start,
         )
     if not clip.frame_count:
-        raise ArgumentError(f"a clip with frames was expected, found {found}, of them 0 asked for")
+        raise ArgumentError(f"a clip with frames was expected, found {found}, 0 of them requested")
     return with_head_turns(clip, face)
 
 
 def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
-    """A clip whose neck and head also turn the raw controls that hold the rotations of joints.
+    """A clip whose neck and head curves also set the raw controls for rotations of joints.
 
     Args:
-        clip: with or without curves of ANGLES. Curves of these raw controls that it has stay.
-        face: on which it plays.
+        clip: with or without curves of ANGLES. Existing curves of these raw controls stay.
+        face: the character.
 
     Returns:
-        The clip with four curves more for each joint.
+        The clip with four additional curves for each joint.
     """
     raw = face.rig.raw_control_names
     given = dict(zip(clip.names, clip.curves, strict=True))
@@ -176,7 +178,7 @@ def with_head_turns(clip: risorius.Clip, face: Face) -> risorius.Clip:
 
 
 class Chunk(NamedTuple):
-    """Some frames in a row."""
+    """Consecutive frames."""
 
     first: int
     pose: risorius.Pose
@@ -184,7 +186,8 @@ class Chunk(NamedTuple):
 
 
 def missing(clip: risorius.Clip, face: Face) -> list[str]:
-    """The names of the curves of clip that move nothing: face has no raw control so named."""
+    """The names of the clip's curves that move nothing, because the face has no such raw
+    control."""
     have = set(face.rig.raw_control_names)
     bones = {face.shares.get(item.joint, ("", 0.0))[0] for item in face.turning}
     have.update(name for bone in bones for name in ANGLES.get(bone, ()))
@@ -192,15 +195,15 @@ def missing(clip: risorius.Clip, face: Face) -> list[str]:
 
 
 def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Iterator[Chunk]:
-    """The poses of every frame, in chunks of a size that depends on the character only.
+    """The poses of all frames, in chunks whose size depends only on the character.
 
-    Controls without a curve are at rest. A frame is Rig.evaluate of its controls, bit for bit.
+    Controls without a curve rest. Each frame equals Rig.evaluate of its controls, bit for bit.
 
     Args:
-        clip: curves of raw controls; those that the character has no control for are passed over.
-        face: of `load_face`.
+        clip: curves of raw controls; unknown ones are ignored.
+        face: from `load_face`.
         lod: from 0, below the character's number of LODs.
-        threads: that evaluate at once; a chunk has as many times more frames.
+        threads: number of threads; the size of a chunk is multiplied by it.
     """
     place = {name: i for i, name in enumerate(face.rig.raw_control_names)}
     rows = [i for i, name in enumerate(clip.names) if name in place]
@@ -215,7 +218,7 @@ def played(clip: risorius.Clip, face: Face, lod: int, threads: int = 1) -> Itera
 
 
 def chunk_frames(face: Face) -> int:
-    """Frames that are evaluated at a time by a thread."""
+    """Frames that one thread evaluates at a time."""
     numbers = face.rig.joint_count * len(face.columns) + face.rig.control_count
     numbers += face.rig.blend_shape_count + face.rig.animated_map_count
     return int(np.clip(_CHUNK_BYTES // (4 * max(1, numbers)), 16, 1024))

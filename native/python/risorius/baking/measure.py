@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an animation does to a face, in numbers."""
+"""Measures the effect of an animation on a face."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .face import Chunk, Face, Floats, missing
 
 
 class Measure:
-    """Largest joint move and correctives at work, gathered chunk by chunk."""
+    """Finds the largest joint motion and the active correctives, chunk by chunk."""
 
     def __init__(self, clip: risorius.Clip, face: Face) -> None:
         self.clip, self.face = clip, face
@@ -27,7 +27,7 @@ class Measure:
         squared = np.einsum("fjx,fjx->fj", moves, moves)
         if squared.size:
             largest = int(np.argmax(squared))
-            if not np.isfinite(squared.flat[largest]):  # argmax takes a NaN for the largest
+            if not np.isfinite(squared.flat[largest]):  # argmax treats NaN as the largest
                 squared = np.nan_to_num(squared, nan=-1.0, posinf=-1.0)
                 largest = int(np.argmax(squared))
             if squared.flat[largest] > self._squared:
@@ -36,10 +36,10 @@ class Measure:
         self._fired |= (chunk.pose.controls[:, self._psds] != 0).any(axis=0)
 
     def finish(self) -> None:
-        """Nothing is left to do."""
+        """Nothing remains to be done."""
 
     def facts(self) -> dict[str, Any]:
-        """Plain values: see docs/batch.md for each."""
+        """Plain values: docs/batch.md describes each."""
         driven = set(self.face.rig.raw_control_names)
         rows = [i for i, name in enumerate(self.clip.names) if name in driven]
         curves = self.clip.curves[rows]
@@ -65,7 +65,7 @@ class Measure:
         }
 
     def _turns(self) -> set[str]:
-        """Controls that are a number of a quaternion: theirs is -1..1."""
+        """Controls that are a number of a quaternion, whose range is -1..1."""
         names = self.face.rig.raw_control_names
         rests = np.flatnonzero(self.face.rig.initial_raw_controls)
         bases = {names[i].rpartition(".")[0] for i in rests}
@@ -73,7 +73,7 @@ class Measure:
 
 
 def _ranges(names: list[str], curves: Floats) -> dict[str, tuple[float, float]]:
-    """Smallest and largest finite number of each curve, 0 where there is none."""
+    """Smallest and largest finite number of each curve, 0 if there is none."""
     finite = np.where(np.isfinite(curves), curves, np.float32(np.nan))
     low = np.nan_to_num(np.fmin.reduce(finite, axis=1))
     high = np.nan_to_num(np.fmax.reduce(finite, axis=1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far long work is, on a terminal or in a log."""
+"""Progress of long work, on a terminal or in a log."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ _LINE_SECONDS = 10.0
 
 
 class Progress:
-    """A bar that is redrawn on a terminal, else a line now and then.
+    """A bar that is redrawn on a terminal, otherwise a line now and then.
 
-    Nothing is shown before the first interval has passed: what is done at once needs no bar.
+    Nothing is shown before the first interval has passed, because quick work needs no bar.
     """
 
     def __init__(
         self, total: int, noun: str, *, before: int = 0, stream: TextIO | None = None
     ) -> None:
-        """Args: total: of what noun says, e.g. "jobs". before: done already, at no cost. stream:
-        else stderr."""
+        """Args: total: number of items. noun: their name, e.g. "jobs". before: items that were done
+        earlier. stream: default is stderr."""
         self.total, self.noun = total, noun
         self.done = self._before = before
         self.frames = 0
@@ -32,12 +32,12 @@ class Progress:
         self._drawn = False
 
     def update(self, done: int, frames: int = 0, note: str = "") -> None:
-        """So much is done; drawn anew now and then only.
+        """Report the state; it is drawn only now and then.
 
         Args:
-            done: of the total.
-            frames: how many in all so far; 0: no speed is shown.
-            note: stands at the end of the line.
+            done: number of finished items.
+            frames: number of frames so far; 0: show no speed.
+            note: text at the end of the line.
         """
         self.done, self.frames = done, frames
         now = time.monotonic()
@@ -50,7 +50,7 @@ class Progress:
 
         Args:
             elapsed: seconds since the beginning.
-            note: stands at its end.
+            note: text at its end.
         """
         part = self.done / self.total if self.total else 1.0
         words = [f"{self.done:,} of {self.total:,} {self.noun}"]
@@ -74,13 +74,13 @@ class Progress:
         self._stream.flush()
 
     def say(self, text: str) -> None:
-        """A line that stays."""
+        """Print a permanent line."""
         self.close()
         self._stream.write(f"risorius: {text}\n")
         self._stream.flush()
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self._drawn:
             width = shutil.get_terminal_size().columns - 1
             self._stream.write("\r" + " " * width + "\r")

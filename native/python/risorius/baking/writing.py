@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Baked animation as .npz and .csv, written as it is computed."""
+"""Writes baked animation as .npz and .csv during the computation."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _SPOOL_BYTES = 32 << 20
 
 
 class NpzWriter:
-    """Arrays of every frame, of which one is written at once and the others wait beside it.
+    """Writes arrays of all frames, one directly and the others after it.
 
-    A zip archive takes one member at a time. The largest goes straight into it; what is too large
-    to wait in memory waits in a file that nobody else sees.
+    A zip archive takes one member at a time. The largest array goes straight into it; arrays that
+    are too large for memory wait in an anonymous temporary file.
     """
 
     def __init__(
@@ -38,7 +38,8 @@ class NpzWriter:
         parts: Sequence[str],
         compress: bool,
     ) -> None:
-        """Args: beside: arrays that are not of frames, see about()."""
+        """Args: file; beside: arrays that do not depend on frames, see about(); face; parts;
+        compress."""
         self._beside = beside
         frames = len(beside["times"])
         self._method = zipfile.ZIP_DEFLATED if compress else zipfile.ZIP_STORED
@@ -49,7 +50,7 @@ class NpzWriter:
         self._parts = sorted(parts, key=lambda part: -face.rest(part).size)
         self._waiting: dict[str, IO[bytes]] = {}
         for part in self._parts[1:]:
-            # The stack closes the file, also after an exception.
+            # The stack closes the file, even after an exception.
             spool = tempfile.SpooledTemporaryFile(_SPOOL_BYTES)  # noqa: SIM115
             self._waiting[part] = self._stack.enter_context(spool)
         self._shapes = {part: (frames, *face.rest(part).shape) for part in self._parts}
@@ -66,14 +67,15 @@ class NpzWriter:
             self._stack.close()
 
     def _member(self, part: str) -> IO[bytes]:
-        """The array of a part, opened behind its header."""
+        """The array of a part, opened after its header."""
         member = self._open(FIELDS[part])
         about = {"descr": "<f4", "fortran_order": False, "shape": self._shapes[part]}
         np.lib.format.write_array_header_1_0(member, about)  # type: ignore[no-untyped-call]
         return member
 
     def _open(self, name: str) -> IO[bytes]:
-        info = zipfile.ZipInfo(f"{name}.npy")  # dated 1980: the same animation gives the same bytes
+        # Dated 1980, so that the same animation gives the same bytes.
+        info = zipfile.ZipInfo(f"{name}.npy")
         info.compress_type = self._method
         return self._zip.open(info, "w", force_zip64=True)
 
@@ -90,7 +92,7 @@ class NpzWriter:
                 raise
 
     def finish(self) -> None:
-        """Write what waits, and what is not of frames."""
+        """Write the waiting arrays, and those that do not depend on frames."""
         if self._first is not None:
             self._first.close()
             self._first = None
@@ -108,13 +110,13 @@ class NpzWriter:
 def about(
     clip: risorius.Clip, face: Face, lod: int, parts: Sequence[str]
 ) -> dict[str, npt.NDArray[Any]]:
-    """What stands in an .npz beside the arrays of frames.
+    """The arrays of an .npz that do not depend on frames.
 
     Args:
-        clip: that is baked.
-        face: of `load_face`.
-        lod: that is baked, from 0.
-        parts: which of PARTS are baked; their names are among it.
+        clip: the baked clip.
+        face: from `load_face`.
+        lod: the baked LOD, from 0.
+        parts: baked parts, from PARTS; their names are included.
 
     Returns:
         Name in the .npz -> array; times are seconds.
@@ -148,12 +150,12 @@ def about(
 
 
 def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> dict[str, Any]:
-    """Part -> the flat indices of its numbers that are not at rest in some frame.
+    """Part -> the flat indices of its numbers that leave their rest value in some frame.
 
     Args:
-        face: of `load_face`.
+        face: from `load_face`.
         chunks: all frames.
-        parts: which of PARTS.
+        parts: from PARTS.
 
     Returns:
         int64[moving] for each part.
@@ -167,12 +169,12 @@ def find_moving(face: Face, chunks: Iterable[Chunk], parts: Sequence[str]) -> di
 
 
 class CsvWriter:
-    """A row a frame: its time and the numbers that move.
+    """Writes a row per frame: its time and the moving numbers.
 
     Args:
-        file: bytes.
+        file: open for writing bytes.
         times: float64[frames].
-        moving: as of find_moving.
+        moving: from find_moving.
     """
 
     def __init__(
@@ -184,8 +186,8 @@ class CsvWriter:
         for part, indices in moving.items():
             header += _headings(face, part, indices)
         csv.writer(self._text, lineterminator="\n").writerow(header)
-        # Nine digits are enough to give back every float32, and a format is three times as fast as
-        # the shortest digits that would do.
+        # Nine digits restore every float32, and a format is three times as fast as the shortest
+        # digits.
         self._row = ",%.9g" * (len(header) - 1) + "\n"
 
     def add(self, chunk: Chunk) -> None:
@@ -201,7 +203,7 @@ class CsvWriter:
             yield f"{float(self._times[chunk.first + i])!r}{self._row % tuple(row)}"
 
     def finish(self) -> None:
-        """Hand the file back, all written."""
+        """Detach the file after everything is written."""
         self._text.detach()
 
 

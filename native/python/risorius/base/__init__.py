@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What every room uses: errors, budgets, filters, TOML. Knows no other room."""
+"""Tools that every room uses: errors, budgets, filters, TOML. Imports no other room."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many threads NumPy's linear algebra takes."""
+"""Limits the threads of NumPy's linear algebra."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from contextlib import AbstractContextManager, nullcontext
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """Linear algebra by the thread that asks for it alone, until the context ends.
+    """Make linear algebra use only the calling thread until the context ends.
 
-    Work that shares its cores out itself has nothing of more: OpenBLAS's threads wait for each
-    other at full load, and take a core from whatever else is done. Without threadpoolctl, as
-    inside Blender, everything stays as it is.
+    Use it for work that already occupies all cores: OpenBLAS's threads would wait for each other at
+    full load and take cores from other work. Without threadpoolctl, as inside Blender, nothing
+    changes.
     """
     try:
         from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]

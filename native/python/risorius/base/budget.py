@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What reading a file may take, in proportion to the file.
+"""Limits on memory and work for reading a file, in proportion to its size.
 
-A file may say in a few bytes what takes gigabytes: arrays that unfold a thousand times, a thousand
-curves on one array, two frames a year apart. So each reader counts what it is about to hold and to
-do, and stops before it does. No clock: the same file gives the same answer on every machine.
+A few bytes of a file may demand gigabytes: arrays that unfold a thousand times, a thousand curves
+that share one array, two frames a year apart. Therefore each reader counts bytes and steps before
+it takes them. No clock is involved, so that the same file gives the same result on every machine.
 """
 
 from __future__ import annotations
@@ -11,25 +11,25 @@ from __future__ import annotations
 from .errors import RisoriusError
 
 BASE_BYTES = 256 << 20
-"""What any file may take, however small: an hour of a face's curves that say little."""
+"""Limit for any file, even a tiny one: enough for an hour of a face's curves."""
 BYTES_PER_BYTE = 32
 BASE_STEPS = 20_000_000
 STEPS_PER_BYTE = 64
 
 
 class BudgetError(RisoriusError):
-    """More memory or work would be needed than what was given can be worth."""
+    """The file demands more memory or work than a file of its size may."""
 
     code = "limit"
 
 
 class Budget:
-    """Bytes and steps that are left; handed through all that one file goes through.
+    """The bytes and steps that are left while one file is read.
 
     Args:
-        bytes_: that may be held, in all.
-        steps: that may be done; about one per number that is looked at, some nanoseconds each.
-        name: of the file, which errors begin with; "": the caller names it.
+        bytes_: largest number of bytes that may be held in total.
+        steps: largest number of steps, about one per number that is read (some nanoseconds).
+        name: name of the file, which begins error messages; "": the caller adds it.
     """
 
     def __init__(self, bytes_: int, steps: int, name: str = "") -> None:
@@ -39,7 +39,7 @@ class Budget:
 
     @classmethod
     def of(cls, size: int, name: str = "") -> Budget:
-        """For what `size` bytes say, of a file of that name."""
+        """The budget for a file of `size` bytes with this name."""
         return cls(BASE_BYTES + BYTES_PER_BYTE * size, BASE_STEPS + STEPS_PER_BYTE * size, name)
 
     def hold(self, count: float, place: str) -> None:
@@ -47,7 +47,7 @@ class Budget:
 
         Args:
             count: bytes.
-            place: what the error calls what would take them.
+            place: the object that needs the bytes, for the error.
 
         Raises:
             BudgetError: fewer are left.
@@ -61,7 +61,7 @@ class Budget:
 
         Args:
             count: steps, about one per number that is looked at.
-            place: what the error calls what would take them.
+            place: the object that needs the steps, for the error.
 
         Raises:
             BudgetError: fewer are left.
@@ -72,15 +72,15 @@ class Budget:
 
 
 def _amount(count: float) -> str:
-    """A file may state whole numbers that no float holds; more than the world has is enough."""
+    """The amount as text; a file may state integers beyond float."""
     return f"{min(count, 1 << 80) if isinstance(count, int) else count:,.0f}"
 
 
 def _left(left: int, most: int, count: float, wanted: str, done: str) -> int:
-    """What is left once `count` is taken. Raises: BudgetError: there is not so much."""
+    """The rest after `count` is taken. Raises: BudgetError: less is left."""
     if not count <= left:  # also of NaN
         raise BudgetError(
             f"{wanted} more than the {most - left:,} {done} before would be needed, "
-            f"at most {most:,} in all were expected of what has this size"
+            f"at most {most:,} in total were expected for this size"
         )
     return left - int(count)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How something goes smoothly from one value to another."""
+"""Smooth transitions between two values."""
 
 from __future__ import annotations
 

@@ -1,31 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""The family of this package's errors: one class above all of them, and one way to say them."""
+"""The base class of this package's errors, and one way to describe any error."""
 
 from __future__ import annotations
 
 
 class RisoriusError(ValueError):
-    """Something that a user can mend; the text is one sentence that says what and where.
+    """An error that the user can mend; its text is one sentence with the cause and the place.
 
-    A ValueError of another class is a fault in the program that calls, or in this one.
+    A ValueError of another class is a fault in the calling program or in this one.
     """
 
     code: str = "invalid"
-    """What kind of error it is, for programs, e.g. "truncated"."""
+    """The kind of error, for programs, e.g. "truncated"."""
     where: str = ""
-    """The file, field or argument; empty where the sentence alone says it."""
+    """The file, field or argument; empty if the sentence names it."""
     offset: int | None = None
     """Byte offset in the file."""
 
 
 class ArgumentError(RisoriusError):
-    """A value that the caller gave, often as a user typed it, which makes no sense."""
+    """An invalid value from the caller, often typed by a user."""
 
     code = "invalid_argument"
 
 
 def sentence(error: BaseException) -> str:
-    """What went wrong, with the file's name where the error knows it."""
+    """The error as a sentence, with the file's name if the error has one."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     if isinstance(error, MemoryError):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What takes noise out of curves: for whole curves, and for values that come in one by one."""
+"""Filters against noise: for whole curves, and for values that arrive live."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Doubles = npt.NDArray[np.float64]
 
 
 def gaussian(curves: npt.ArrayLike, times: Doubles, width: float, reach: int) -> Doubles:
-    """A mean around each frame, weighted by a bell over time: it moves nothing earlier or later.
+    """A mean around each frame, weighted by a Gaussian over time; it causes no delay.
 
-    At the ends the mean is of the frames that there are.
+    At the ends the mean uses only the existing frames.
 
     Args:
         curves: [..., N] values at N frames.
         times: float64[N] seconds, ascending.
-        width: standard deviation of the bell in seconds, above 0.
-        reach: how many frames before and after each one count.
+        width: standard deviation of the Gaussian in seconds, above 0.
+        reach: number of frames before and after each frame that count.
 
     Returns:
         float64[..., N].
@@ -39,16 +39,16 @@ def gaussian(curves: npt.ArrayLike, times: Doubles, width: float, reach: int) ->
 
 
 class OneEuro:
-    """The one-euro filter: a low pass that opens with speed; for values that come in live.
+    """The one-euro filter for live values: a low pass whose cutoff grows with speed.
 
-    Slow noise is held back by `cutoff`, fast motion passes with little delay by `beta`.
+    `cutoff` suppresses slow noise; `beta` lets fast motion pass with little delay.
     From: Casiez, Roussel, Vogel, "1 euro filter", CHI 2012.
 
     Attributes:
-        cutoff: Hz at rest; may be changed between two frames.
-        beta: Hz more for each unit and second of speed.
-        speed_cutoff: Hz, of the speed itself.
-        longest_gap: seconds; after as long a gap, and after a step back in time, it begins anew.
+        cutoff: Hz at rest; may be changed between frames.
+        beta: additional Hz per unit per second of speed.
+        speed_cutoff: cutoff in Hz for the speed itself.
+        longest_gap: seconds; after a longer gap, or a step back in time, the filter restarts.
     """
 
     def __init__(
@@ -58,17 +58,17 @@ class OneEuro:
         speed_cutoff: float = 1.0,
         longest_gap: float | None = None,
     ) -> None:
-        """Begin without a past.
+        """Start without earlier values.
 
         Args:
             cutoff: see the class, as the others; above 0.
             beta: 0 or more.
             speed_cutoff: above 0.
-            longest_gap: None: it never begins anew, and a frame that is not after the last counts
-                as the last.
+            longest_gap: None: the filter never restarts, and a frame that is not later than the
+                last counts as the last.
 
         Raises:
-            ArgumentError: a number that is out of these ranges.
+            ArgumentError: a number outside of these ranges.
         """
         if not (cutoff > 0.0 and beta >= 0.0 and speed_cutoff > 0.0):
             raise ArgumentError("cutoffs above 0 Hz and a beta of 0 or more were expected")
@@ -82,8 +82,8 @@ class OneEuro:
         """Filtered values of a frame.
 
         Args:
-            time: seconds; the same as before gives the last values again.
-            values: [controls]; another number of them begins anew.
+            time: seconds; an unchanged time returns the last values again.
+            values: [controls]; a different number of controls restarts the filter.
 
         Returns:
             float64[controls].
@@ -105,5 +105,5 @@ class OneEuro:
 
 
 def _share(cutoff: float | Doubles, step: float) -> Doubles:
-    """Of a new value in a first order low pass at `cutoff` Hz, after a step in seconds."""
+    """The weight of a new value in a first-order low pass at `cutoff` Hz after `step` seconds."""
     return np.asarray(1.0 / (1.0 + 1.0 / (2.0 * np.pi * np.asarray(cutoff) * step)))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Numbers and texts that people and files give, checked where they enter.
+"""Checks of numbers and texts from users and files, at the point where they enter.
 
-TOML and JSON have whole numbers of any length, and a text may spell a number in digits that Python
-alone reads. Each goes through here once and is in its range from then on.
+TOML and JSON allow integers of any length, and Python alone accepts some spellings of digits. A
+value passes through here once and is in range from then on.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from .errors import ArgumentError
 
 T = TypeVar("T")
 LARGEST = 3.4028234663852886e38
-"""Of a float32, which DNA files and clips hold."""
+"""The largest float32, the type of DNA files and clips."""
 MOST = (1 << 53) - 1
-"""The largest whole number that a float64 and every reader of JSON keep."""
+"""The largest integer that a float64 and every JSON reader keep exactly."""
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
-_SHOWN = 40  # letters of a value in an error
+_SHOWN = 40  # characters of a value that an error shows
 
 
 class GivenError(ArgumentError):
-    """A value of another kind or outside its range; the sentence says what was expected.
+    """A value of the wrong type or range; the sentence names the expected value.
 
-    It names no file and no field: who read them puts them before it.
+    It names no file and no field; the reader adds them.
     """
 
     code = "given"
 
 
 def whole(value: object, low: int, high: int = MOST) -> int:
-    """A whole number of a file or a caller.
+    """An integer from a file or a caller.
 
     Args:
-        value: of any type; true and false are no numbers.
-        low: the least that is allowed.
-        high: the most that is allowed.
+        value: a value of any type; true and false do not count as numbers.
+        low: smallest allowed value.
+        high: largest allowed value.
 
     Raises:
-        GivenError: it is none, or outside that range.
+        GivenError: not an integer, or out of range.
     """
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise GivenError(f"a whole number was expected, found {shown(value)}")
@@ -55,16 +55,16 @@ def whole(value: object, low: int, high: int = MOST) -> int:
 def finite(
     value: object, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
 ) -> float:
-    """A finite number of a file or a caller.
+    """A finite number from a file or a caller.
 
     Args:
-        value: of any type; true and false are no numbers.
-        low: the least that is allowed.
-        high: the most that is allowed.
-        above: low itself is not allowed.
+        value: a value of any type; true and false do not count as numbers.
+        low: smallest allowed value.
+        high: largest allowed value.
+        above: exclude low itself.
 
     Raises:
-        GivenError: it is none, or outside that range.
+        GivenError: not a finite number, or out of range.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise GivenError(f"a number was expected, found {shown(value)}")
@@ -73,15 +73,15 @@ def finite(
 
 
 def whole_text(typed: str, low: int, high: int = MOST) -> int:
-    """A whole number that somebody typed, in the digits 0 to 9.
+    """An integer that a user typed, in the digits 0 to 9.
 
     Args:
-        typed: by somebody.
-        low: the least that is allowed.
-        high: the most that is allowed.
+        typed: the text.
+        low: smallest allowed value.
+        high: largest allowed value.
 
     Raises:
-        GivenError: it is none, or outside that range.
+        GivenError: not an integer, or out of range.
     """
     if not _WHOLE.fullmatch(typed):
         raise GivenError(f"a whole number was expected, found {shown(typed)}")
@@ -91,16 +91,16 @@ def whole_text(typed: str, low: int, high: int = MOST) -> int:
 def finite_text(
     typed: str, low: float = -LARGEST, high: float = LARGEST, *, above: bool = False
 ) -> float:
-    """A finite number that somebody typed.
+    """A finite number that a user typed.
 
     Args:
-        typed: by somebody.
-        low: the least that is allowed.
-        high: the most that is allowed.
-        above: low itself is not allowed.
+        typed: the text.
+        low: smallest allowed value.
+        high: largest allowed value.
+        above: exclude low itself.
 
     Raises:
-        GivenError: it is none, or outside that range.
+        GivenError: not a finite number, or out of range.
     """
     try:
         value = float(typed if typed.isascii() and "_" not in typed else "")
@@ -110,13 +110,13 @@ def finite_text(
 
 
 def text(value: object) -> str:
-    """A text of a file.
+    """A text from a file.
 
     Args:
-        value: of any type.
+        value: a value of any type.
 
     Raises:
-        GivenError: it is none, is empty, or has a zero byte, which no name may have.
+        GivenError: not a text, or empty, or with a zero byte, which no name may have.
     """
     if not isinstance(value, str) or not value or "\0" in value:
         raise GivenError(f"text was expected, found {shown(value)}")
@@ -124,13 +124,13 @@ def text(value: object) -> str:
 
 
 def flag(value: object) -> bool:
-    """True or false of a file.
+    """A truth value from a file.
 
     Args:
-        value: of any type.
+        value: a value of any type.
 
     Raises:
-        GivenError: it is neither.
+        GivenError: neither true nor false.
     """
     if not isinstance(value, bool):
         raise GivenError(f"true or false was expected, found {shown(value)}")
@@ -138,14 +138,14 @@ def flag(value: object) -> bool:
 
 
 def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
-    """A list of a file.
+    """A list from a file.
 
     Args:
-        value: of any type.
-        of: checks one of its items and gives it back.
+        value: a value of any type.
+        of: checks and returns one item.
 
     Raises:
-        GivenError: it is none, or as `of` raises.
+        GivenError: not a list; also as `of` raises.
     """
     if not isinstance(value, list):
         raise GivenError(f"a list was expected, found {shown(value)}")
@@ -153,17 +153,17 @@ def several(value: object, of: Callable[[object], T]) -> tuple[T, ...]:
 
 
 def checked(name: str, check: Callable[..., T], value: object, low: float, high: float) -> T:
-    """An argument of a function, by `whole` or `finite`.
+    """An argument of a function, checked by `whole` or `finite`.
 
     Args:
-        name: of the argument.
-        check: one of the two.
-        value: of any type.
-        low: the least that is allowed.
-        high: the most that is allowed.
+        name: name of the argument.
+        check: `whole` or `finite`.
+        value: a value of any type.
+        low: smallest allowed value.
+        high: largest allowed value.
 
     Raises:
-        ArgumentError: it is none, or outside that range; names the argument.
+        ArgumentError: not such a number, or out of range; the error names the argument.
     """
     try:
         return check(value, low, high)
@@ -172,10 +172,10 @@ def checked(name: str, check: Callable[..., T], value: object, low: float, high:
 
 
 def shown(value: object) -> str:
-    """A value as errors show it, cut where it is long.
+    """A value as errors show it, shortened if it is long.
 
     Args:
-        value: of any type.
+        value: a value of any type.
     """
     if isinstance(value, list | tuple | dict):
         return "a table" if isinstance(value, dict) else "a list"
@@ -186,7 +186,7 @@ def shown(value: object) -> str:
 
 
 def _inside(value: float, found: object, low: float, high: float, *, above: bool) -> float:
-    """A number in its range. Raises: GivenError that shows what was found."""
+    """Return value if it is in range. Raises: GivenError that shows `found`."""
     if isinstance(value, float) and not math.isfinite(value):
         known = low > -LARGEST and high < LARGEST
         expected = f"{low:g} to {high:g}" if known else "a finite number"

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What NumPy raises where an .npz is damaged, and what its arrays may unfold to.
+"""The errors that NumPy raises for a damaged .npz, and a limit for the size of its arrays.
 
-NumPy promises nothing: zip, zlib, struct and, from 3.12 on, Python's own tokenizer shine through.
-A place beyond the file is an OSError, as a file that is not there is: open it first.
+NumPy documents no errors: those of zip, zlib, struct and, from 3.12 on, Python's tokenizer pass
+through. An offset beyond the file raises OSError, like a missing file: open the file first.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ DAMAGED: tuple[type[Exception], ...] = (
 
 
 def hold_arrays(file: BinaryIO) -> None:
-    """Before NumPy unfolds an .npz: its arrays are in proportion to it.
+    """Check the sizes of an .npz's arrays before NumPy unpacks them.
 
     Args:
-        file: opened; is read from its beginning afterwards.
+        file: open for reading; NumPy reads it from the beginning afterwards.
 
     Raises:
-        BudgetError: they are not.
-        BadZipFile and others of DAMAGED: no .npz.
+        BudgetError: the arrays are too large in proportion to the file.
+        BadZipFile and others of DAMAGED: not a valid .npz.
     """
     with zipfile.ZipFile(file) as members:
         budget = Budget.of(file.seek(0, 2))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Whole files and streams in memory, of a size that is known to fit before it is read."""
+"""Reads whole files and streams whose size is checked before reading."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import BinaryIO
 from .errors import RisoriusError
 
 TEXT = 16 << 20
-"""Bytes of what a person wrote: specs, mappings, jobs, transcripts."""
+"""Largest text file that a person writes: specs, mappings, jobs, transcripts."""
 MESH = 1 << 29
-"""Bytes of a mesh or a take, as text or not."""
+"""Largest file of a mesh or a take."""
 FACE = 4 << 30
-"""Bytes of a DNA file, which its own format allows, also as JSON."""
+"""Largest DNA file that the format allows, also as JSON."""
 _PIECE = 1 << 20
 
 
@@ -23,8 +23,8 @@ class ReadingError(RisoriusError):
     """A file that is larger than its kind may be, or that has no end.
 
     Attributes:
-        name: of the file.
-        what: what was expected and what was found.
+        name: name of the file.
+        what: the expected and the found value.
     """
 
     code = "reading"
@@ -35,16 +35,16 @@ class ReadingError(RisoriusError):
 
 
 def read_file(path: str | os.PathLike[str], most: int, *, found: bool = False) -> bytes:
-    """The bytes of a file; how large it is, is asked before it is read.
+    """The bytes of a file, after a check of its size.
 
     Args:
-        path: of the file.
-        most: bytes that it may have.
-        found: nobody typed this name: it is out of another file or a folder, where a pipe would be
-            waited for without end.
+        path: path of the file.
+        most: largest number of bytes.
+        found: the name comes from another file or a folder, not from a user; then a pipe is
+            refused, because reading it could wait for ever.
 
     Raises:
-        ReadingError: larger, a device, or a pipe that was found.
+        ReadingError: the file is larger, a device, or a pipe with `found`.
         OSError: it cannot be read.
     """
     name = os.fspath(path)
@@ -58,10 +58,10 @@ def read_file(path: str | os.PathLike[str], most: int, *, found: bool = False) -
 
 
 def open_file(path: str | os.PathLike[str]) -> BufferedReader:
-    """A file or a pipe, open for reading.
+    """Open a file or a pipe for reading.
 
     Args:
-        path: of it.
+        path: path of the file.
 
     Raises:
         ReadingError: a device, which has no end.
@@ -79,8 +79,8 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
 
     Args:
         file: open for reading.
-        most: bytes that may be left.
-        name: of the stream, for the error.
+        most: largest number of bytes left.
+        name: name of the stream, for the error.
 
     Raises:
         ReadingError: more are left.
@@ -97,11 +97,11 @@ def read_stream(file: BinaryIO, most: int, name: str) -> bytes:
 
 
 def require_regular(path: str | os.PathLike[str]) -> None:
-    """Refuse what is no file, though its name was found among files.
+    """Raise an error if a name found among files is not a file.
 
     Raises:
         ReadingError: a pipe, a socket, a device.
-        OSError: it is not there, or links to itself.
+        OSError: the file does not exist, or links to itself.
     """
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):  # reading a folder is an OSError

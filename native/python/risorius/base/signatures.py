@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a file is that a reader does not expect, told from its bytes whatever its name says."""
+"""Recognises the kind of an unexpected file by its bytes, independent of its name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from .errors import RisoriusError
 
-_PART = 1 << 16  # bytes at the begin and at the end that tell
+_PART = 1 << 16  # bytes at the beginning and at the end that are looked at
 _TEXT = 512
 
 
@@ -20,7 +20,7 @@ class Kind(NamedTuple):
     code: str
     words: str
     mend: str = ""
-    """What to do about it."""
+    """Advice to the user."""
 
     def __str__(self) -> str:
         return f"{self.words}: {self.mend}" if self.mend else self.words
@@ -38,7 +38,7 @@ _WORD = Kind("word", "a document (Word)", "save it as plain text")
 _OFFICE = Kind("office", "a document of an office program", "save it as CSV or as plain text")
 _ZIP = Kind("zip", "an archive (ZIP)", "unpack it first")
 _UNREAL = Kind("unreal", "an asset of Unreal", "export it there, as FBX, JSON or DNA")
-# First bytes, where they stand, and what such a file is. None of them is text in UTF-8 or UTF-16.
+# First bytes, their offset, and the kind of the file. None of them is text in UTF-8 or UTF-16.
 _BYTES = (
     (b"WAVE", 8, SOUND),
     (b"AIFF", 8, SOUND),
@@ -75,7 +75,7 @@ _BYTES = (
     (b"RZC\x1a", 0,
      Kind("rzc", "a clip of Risorius (.rzc)", "if its name ends otherwise, rename it")),
 )  # fmt: skip
-# Names of files inside of archives that are documents.
+# Names of files inside archives that are documents.
 _INSIDE = (
     (b"xl/workbook", _EXCEL),
     (b"word/document", _WORD),
@@ -105,10 +105,10 @@ _TEXTS = (
 
 
 def kind_of(data: bytes) -> Kind | None:
-    """The kind of a file by its bytes, or None where they do not show it.
+    """The kind of a file by its bytes, or None if they do not show it.
 
     Args:
-        data: the file, or what `ends_of` reads of it.
+        data: the file, or the result of `ends_of`.
     """
     for start, at, kind in _BYTES:
         if data[at : at + len(start)] == start:
@@ -122,20 +122,20 @@ def kind_of(data: bytes) -> Kind | None:
 
 
 def other_kind(data: bytes, own: Container[str] = ()) -> Kind | None:
-    """The kind of a file, unless the reader takes files of that kind.
+    """The kind of a file, unless the reader accepts that kind.
 
     Args:
         data: as of `kind_of`.
-        own: codes of the kinds that are taken.
+        own: codes of the accepted kinds.
     """
     kind = kind_of(data)
     return None if kind is None or kind.code in own else kind
 
 
 def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
-    """The begin and the end of a file, enough for `kind_of`; nothing of what is no plain file.
+    """The beginning and the end of a file, enough for `kind_of`; empty if it is not a plain file.
 
-    A pipe can be read once only, and opening it may wait for ever.
+    A pipe can be read only once, and opening it may wait for ever.
     """
     if isinstance(source, bytes | bytearray | memoryview):
         return bytes(source[:_PART]) + bytes(source[-_PART:])
@@ -151,10 +151,10 @@ def ends_of(source: str | os.PathLike[str] | bytes) -> bytes:
 
 
 def named(error: RisoriusError, source: str | os.PathLike[str] | bytes) -> RisoriusError:
-    """An error of a file of a wrong kind that says what the file is, where its bytes tell.
+    """An error about a file; if its bytes show another kind of file, the error names that kind.
 
     Args:
-        error: of the native module; its text ends with its place in brackets.
+        error: error of the native module; its text ends with its place in brackets.
         source: the file.
     """
     kind = kind_of(ends_of(source))

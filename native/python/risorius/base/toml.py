@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""TOML that people gave: of a size and a depth that they write."""
+"""Reads TOML from users, with limits on size and depth."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from .errors import ArgumentError, RisoriusError
 
 MOST_BYTES = reading.TEXT
 DEEPEST = 64
-# Dotted keys may have so many parts: the parser's time grows with the square of their number.
+# Limits the parts of a dotted key: the parser's time grows with the square of their number.
 _DEEP_KEY = re.compile(rf"""(?<![\w"'-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 
 class TomlError(RisoriusError):
-    """A text that is no TOML, or none that anybody wrote; says the line where it is known."""
+    """Invalid or excessive TOML; the text has the line if it is known."""
 
     code = "toml"
 
 
 def parse(text: str) -> dict[str, Any]:
-    """The tables of a text.
+    """The tables of a TOML text.
 
     Raises:
-        TomlError: no TOML, larger than MOST_BYTES, nested deeper than DEEPEST.
+        TomlError: not TOML, larger than MOST_BYTES, or nested deeper than DEEPEST.
     """
     if len(text) > MOST_BYTES:
         raise TomlError(f"at most {MOST_BYTES:,} letters were expected, found {len(text):,}")
@@ -46,7 +46,7 @@ def parse(text: str) -> dict[str, Any]:
 
 
 def read(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """A TOML file. Raises: ValueError with the file's name; OSError."""
+    """The tables of a TOML file. Raises: ValueError with the file's name; OSError."""
     try:
         return parse(text_of(path))
     except TomlError as error:
@@ -57,7 +57,7 @@ def text_of(path: str | os.PathLike[str]) -> str:
     """The text of a TOML file, with or without a byte order mark.
 
     Raises:
-        TomlError: no UTF-8; without the file's name.
+        TomlError: not UTF-8; without the file's name.
         ReadingError: larger than MOST_BYTES, or a device.
         OSError: it cannot be read.
     """

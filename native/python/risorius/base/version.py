@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: MIT
-"""The version of this package, as pyproject.toml has it."""
+"""The version of this package, equal to pyproject.toml."""
 
 __version__ = "0.1.0"

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Numbers, nouns and lists as sentences for people have them."""
+"""Numbers, nouns and lists for sentences."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-# Plurals that are not made by adding an s.
+# Irregular plurals.
 _PLURALS = {"vertex": "vertices", "index": "indices", "bias": "biases", "mesh": "meshes"}
 
 
@@ -18,9 +18,9 @@ def counted(number: int, noun: str, several: str | None = None) -> str:
     """A number with its noun, e.g. "1 vertex" or "1,203 vertices".
 
     Args:
-        number: how many.
-        noun: in the singular.
-        several: in the plural; None: as `plural` makes it.
+        number: the number.
+        noun: singular.
+        several: plural; None: from `plural`.
     """
     return f"{number:,} {noun if number == 1 else several or plural(noun)}"
 

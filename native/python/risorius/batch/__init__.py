@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Clips on characters, many at a time: evaluated, baked to files, summed up in numbers.
+"""Plays many clips on many characters: evaluates, bakes and summarises them.
 
 JOBS.toml --read_jobs--> jobs --pool or cluster--> outcomes --> files, journal, summary
 """

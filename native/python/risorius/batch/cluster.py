@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Jobs on an existing Dask cluster."""
+"""Runs jobs on an existing Dask cluster."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _CONNECT_SECONDS = 10.0
 class Cluster:
     """Runs jobs on the workers of a Dask scheduler.
 
-    Every worker must see the files by the same paths and have this version of Risorius. A job that
-    was running when its worker died goes to another one; Dask gives it up after the scheduler's
-    `distributed.scheduler.allowed-failures` (3) more deaths. What else was at that worker may be
-    taken for the cause; so a job that was given up is tried once more with nothing beside it.
+    Every worker must see the files under the same paths and have this version of Risorius. If a
+    worker dies, its job goes to another one; Dask gives it up after the scheduler's
+    `distributed.scheduler.allowed-failures` (3) more deaths. Other jobs at a dead worker may be
+    blamed as well, so that a job that was given up is tried once more with nothing beside it.
 
     Args:
         address: e.g. tcp://10.0.0.5:8786.
-        work: a function that the workers can import, or a partial of one.
+        work: a function that workers can import, or a partial of one.
 
     Raises:
-        PoolError: no `distributed` here, nobody at the address.
+        PoolError: the package `distributed` is missing, or no scheduler answers.
     """
 
     def __init__(self, address: str, work: Work) -> None:
@@ -54,7 +54,7 @@ class Cluster:
         self._run = uuid.uuid4().hex[:8]
 
     def workers(self) -> dict[str, int]:
-        """Address of each worker -> jobs that it runs at a time. Raises: PoolError."""
+        """Address of each worker -> number of jobs that it runs at a time. Raises: PoolError."""
         try:
             return dict(self._client.nthreads())
         except (OSError, ValueError) as error:
@@ -64,10 +64,10 @@ class Cluster:
         return PoolError(f"{self.address}: the scheduler has gone, or has cancelled the jobs")
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """Outcomes as they come. Leaving it early takes back what has not begun.
+        """Outcomes as they arrive. Closing the iterator early cancels jobs that have not begun.
 
         Raises:
-            PoolError: the scheduler has gone.
+            PoolError: the scheduler is gone.
         """
         suspects: list[Job] = []
         try:
@@ -78,11 +78,11 @@ class Cluster:
                 for _ in again:
                     yield Outcome(job.name, "given up: it ends every worker that it is given to")
         finally:
-            with contextlib.suppress(Exception):  # the scheduler may be the reason to leave
+            with contextlib.suppress(Exception):  # the scheduler may be the cause
                 self._client.close(timeout=_CONNECT_SECONDS)
 
     def _all(self, waiting: deque[Job], suspects: list[Job]) -> Iterator[Outcome]:
-        """Run jobs, a few more at a time than there are workers for."""
+        """Run jobs; a few more than the workers take are submitted at a time."""
         running: dict[Any, Job] = {}
         finished = self._dask.as_completed(loop=self._client.loop)
         try:
@@ -94,7 +94,7 @@ class Cluster:
                     running[future] = job
                     finished.add(future)
                 future = next(finished)
-                if future.status == "lost":  # with the worker that did it; Dask has it done again
+                if future.status == "lost":  # lost with its worker; Dask runs it again
                     finished.add(future)
                     continue
                 job = running.pop(future)

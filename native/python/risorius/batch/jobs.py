@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is to be done: JOBS.toml read, checked and spelled out as a list of jobs."""
+"""Reads and checks JOBS.toml, and expands it to a list of jobs."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ MAX_JOBS = 200_000
 
 
 class JobsError(RisoriusError):
-    """A JOBS.toml that cannot be used: file, field, what was found, what was expected."""
+    """An unusable JOBS.toml; the text has file, field, found and expected value."""
 
     code = "jobs"
 
 
 @dataclass(frozen=True)
 class Options:
-    """What changes the contents of an output."""
+    """Options that change the content of an output."""
 
     parts: tuple[str, ...] = DEFAULT_PARTS
     rate: float | None = None
@@ -47,7 +47,8 @@ class Options:
     quaternions: bool = False
     compress: bool = False
     mapping: str | None = None
-    """A built-in one's name or the absolute path of a TOML file; None for the one that fits."""
+    """The name of a built-in mapping or the absolute path of a TOML file; None for the fitting
+    one."""
 
 
 @dataclass(frozen=True)
@@ -55,18 +56,18 @@ class Job:
     """A clip on a character at a LOD."""
 
     name: str
-    """Of its outputs, below the output folder and without a suffix; no other job has it."""
+    """Name of its outputs, below the output folder and without suffix; unique."""
     clip: Path
     character: Path
     lod: int
     outputs: tuple[tuple[str, Path], ...]
-    """Kind of file and where it goes; none where only the facts are wanted."""
+    """Kind and path of each file; empty if only the facts are wanted."""
     options: Options
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A JOBS.toml spelled out."""
+    """An expanded JOBS.toml."""
 
     source: Path
     output: Path
@@ -82,7 +83,7 @@ class Plan:
 class _Found(NamedTuple):
     path: Path
     folder: str
-    """Below the part of the pattern that is no pattern, with slashes; "" for that part itself."""
+    """Path below the fixed part of the pattern, with slashes; "" for the fixed part itself."""
 
 
 class _Table:
@@ -98,7 +99,7 @@ class _Table:
         return JobsError(f"{self._source}: {self._where}{key}: {text}")
 
     def take(self, key: str, expected: str, check: Callable[[Any], bool], default: Any) -> Any:
-        """A value; default is what stands for a missing one, None if there must be one."""
+        """A value; default replaces a missing one, None: the value is required."""
         if key not in self._values:
             if default is None:
                 raise self.error(key, f"{expected} was expected, found nothing")
@@ -109,7 +110,7 @@ class _Table:
         return value
 
     def texts(self, key: str, default: tuple[str, ...] | None) -> list[str]:
-        """A list of strings, or a string for a list of one."""
+        """A list of strings; a single string is a list of one."""
         value = self.take(
             key, "a string or a list of strings",
             lambda v: isinstance(v, str) or _all_of(v, str), default,
@@ -146,8 +147,8 @@ def read_jobs(source: Path) -> Plan:
     """Read a JOBS.toml and find its files.
 
     Raises:
-        JobsError: it cannot be read, has a key or a value that it should not have, a pattern finds
-            nothing, two jobs would write one file.
+        JobsError: the file cannot be read, has an invalid key or value, a pattern matches nothing,
+            or two jobs would write one file.
     """
     try:
         values = toml.parse(toml.text_of(source))
@@ -239,7 +240,7 @@ def _mapping(table: _Table, base: Path) -> str | None:
 
 
 def _find(table: _Table, key: str, base: Path) -> list[_Found]:
-    """The files of patterns, by path; a pattern that finds none is a mistake."""
+    """The files that match patterns, by path; a pattern without a match is an error."""
     out: dict[Path, tuple[_Found, str]] = {}
     for pattern in table.texts(key, None):
         root = _root(base, pattern)
@@ -274,7 +275,7 @@ def _root(base: Path, pattern: str) -> Path:
 
 
 def _check_pattern(table: _Table, pattern: str) -> None:
-    """Fields by their plain names only: a format string could reach into objects."""
+    """Allow only plain field names, because a format string could reach into objects."""
     expected = f"a pattern of {', '.join(f'{{{field}}}' for field in FIELDS)} was expected, "
     try:
         pieces = list(string.Formatter().parse(pattern))
@@ -286,7 +287,7 @@ def _check_pattern(table: _Table, pattern: str) -> None:
 
 
 def _fill(pattern: str, clip: _Found, character: _Found, lod: int) -> str:
-    """The name of a job. Files and folders that were found give parts of it, and no separators."""
+    """The name of a job. Names of found files and folders are made safe, without separators."""
     return pattern.format(
         clip=file_name(clip.path.stem),
         character=file_name(character.path.stem),
@@ -301,7 +302,7 @@ def _folder_name(folder: str) -> str:
 
 
 def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
-    """A path below the output folder. A field that is empty leaves no folder."""
+    """A path below the output folder. An empty field leaves no folder."""
     parts = [part for part in name.replace("\\", "/").split("/") if part not in ("", ".")]
     rooted = name.startswith(("/", "\\")) or (parts and ":" in parts[0] and os.name == "nt")
     if not parts or ".." in parts or rooted:
@@ -317,8 +318,8 @@ def _inside(table: _Table, key: str, output: Path, name: str) -> Path:
 
 
 def _refuse_collisions(plan: Plan) -> None:
-    """Each file is written by one job, and none that is read. Names that differ in case or in how
-    an accent is spelled are one file on some systems."""
+    """Check that each file is written by one job and read by none. Names that differ only in case
+    or in the spelling of an accent are one file on some systems."""
     taken = {_folded(path): "the summary" for path in plan.summary}
     if len(taken) < len(plan.summary):
         raise JobsError(f"{plan.source}: summary: different files were expected, found one twice")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which jobs are done: a line for each, added when its files are whole."""
+"""The journal of finished jobs: a line for each, added when its files are complete."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HEAD = {"risorius_batch": 1}
 
 
 class _Record(NamedTuple):
-    """What must hold for a job to be done, and where in the file its facts are."""
+    """The conditions under which a job counts as finished, and the position of its facts."""
 
     stamp: str
     files: list[list[Any]]
@@ -30,9 +30,9 @@ class _Record(NamedTuple):
 class Journal:
     """A file of JSON lines beside the outputs.
 
-    A job in it is done if what it was made from has not changed and its files are still those that
-    it wrote, by size and time. The facts stay in the file: thousands of jobs with the range of
-    every control are more than one wants in memory.
+    A job in it is finished if its inputs have not changed and its files still have the size and
+    time with which it wrote them. The facts stay in the file, because thousands of jobs with the
+    range of every control would take too much memory.
     """
 
     def __init__(self, path: Path) -> None:
@@ -40,11 +40,11 @@ class Journal:
         self._records: dict[str, _Record] = {}
 
     def read(self) -> None:
-        """Read what an earlier run left; lines that it did not finish are not there."""
+        """Read the journal of an earlier run; incomplete lines are ignored."""
         try:
             with open(self.path, "rb") as file:
                 if _parsed(next(file, b"")) != _HEAD:
-                    return  # a journal of another version: every job is done again
+                    return  # a journal of another version: every job runs again
                 offset = file.tell()
                 for line in iter(file.readline, b""):
                     self._take(line, offset)
@@ -63,7 +63,7 @@ class Journal:
         )
 
     def is_done(self, job: Job) -> bool:
-        """The job need not be done again."""
+        """Whether the job is finished."""
         record = self._records.get(job.name)
         try:
             return record is not None and record[:2] == (stamp(job), _files(job))
@@ -71,14 +71,15 @@ class Journal:
             return False
 
     def facts(self, name: str) -> dict[str, Any]:
-        """Of a job that is done. Raises: OSError, KeyError; JobsError: its line is not there."""
+        """The facts of a finished job. Raises: OSError, KeyError; JobsError: its line is
+        missing."""
         record = _parsed(self._line_of(name))
         if not isinstance(record, dict) or not isinstance(record.get("facts"), dict):
             raise JobsError(f"{self.path}: somebody else has changed it while this batch ran")
         return dict(record["facts"])
 
     def begin(self, kept: Iterable[str]) -> None:
-        """Start the file anew with the lines of these jobs. Raises: OSError."""
+        """Start a new file with the lines of these jobs. Raises: OSError."""
         records: dict[str, _Record] = {}
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(self.path) as file:
@@ -96,11 +97,11 @@ class Journal:
             return file.read(record.size)
 
     def add(self, job: Job, outcome: Outcome) -> None:
-        """A job is done: its line is on the disk when this returns.
+        """Record a finished job; its line is on the disk when this returns.
 
         Args:
-            job: whose files are whole.
-            outcome: its stamp and facts are kept.
+            job: its files are complete.
+            outcome: its stamp and facts are recorded.
 
         Raises:
             OSError: the journal cannot be written; the error names it.
@@ -135,7 +136,7 @@ def _line(record: dict[str, Any]) -> bytes:
 
 
 def _files(job: Job) -> list[list[Any]]:
-    """Kind, size and time of each output. Raises: OSError: one is not there."""
+    """Kind, size and time of each output. Raises: OSError: one is missing."""
     out: list[list[Any]] = []
     for kind, path in job.outputs:
         about = path.stat()

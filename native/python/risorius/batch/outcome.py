@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What has become of a job."""
+"""The result of a job."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Outcome:
-    """A job that is done, or that has failed and will not be tried again.
+    """A finished job, or one that failed and will not be tried again.
 
     Attributes:
-        name: of the job.
-        error: the sentence why it failed; "" if it is done.
-        stamp: of what it was made from, see stamp().
-        facts: of Measure, and seconds that reading, evaluating and writing took.
-        attempts: workers that it was given to.
+        name: name of the job.
+        error: the reason of the failure; "" if it succeeded.
+        stamp: hash of its inputs, see stamp().
+        facts: of Measure, and the seconds for reading, evaluating and writing.
+        attempts: number of workers that tried it.
     """
 
     name: str

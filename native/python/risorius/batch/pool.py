@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Worker processes of this machine, of which any may die."""
+"""Worker processes on this machine, any of which may die."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ _STOP_SECONDS = 5.0
 
 
 class PoolError(RisoriusError, RuntimeError):
-    """Workers that cannot be started, or a cluster that has gone."""
+    """Workers cannot be started, or a cluster is gone."""
 
     code = "pool"
 
 
 def _serve(connection: Connection[object, object], work: Work) -> None:
-    """A worker's life: jobs in, outcomes out, until nobody is at the other end."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C is the parent's to handle
+    """The main loop of a worker: receives jobs and sends outcomes until the connection closes."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles a terminal's Ctrl-C
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         connection.send(_READY)
         while True:
@@ -44,14 +44,14 @@ def _serve(connection: Connection[object, object], work: Work) -> None:
             assert isinstance(job, Job)
             try:
                 outcome = work(job)
-            except Exception as error:  # noqa: BLE001  one job's fault must not end the others
+            except Exception as error:  # noqa: BLE001  a failing job must not end the others
                 outcome = Outcome(job.name, f"{type(error).__name__}: {error}")
             connection.send(outcome)
 
 
 @contextlib.contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
-    """Who is started in here does not hear Ctrl-C, from its first moment on."""
+    """Processes started in this context ignore Ctrl-C from their first moment on."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -63,10 +63,10 @@ def _ignoring_interrupts() -> Iterator[None]:
 
 
 class _Worker:
-    """A process and the job that it has."""
+    """A process and its present job."""
 
     def __init__(self, work: Work) -> None:
-        context = multiprocessing.get_context("spawn")  # the same on every system
+        context = multiprocessing.get_context("spawn")  # the same method on every system
         self.connection, theirs = context.Pipe()
         self.process: SpawnProcess = context.Process(
             target=_serve, args=(theirs, work), daemon=True
@@ -80,11 +80,12 @@ class _Worker:
 
     def give(self, job: Job) -> None:
         self.job = self.last = job
-        with contextlib.suppress(OSError):  # the worker has died; whoever waits for it notices
+        # The worker has died; the code that waits for it notices.
+        with contextlib.suppress(OSError):
             self.connection.send(job)
 
     def end(self) -> str:
-        """Wait for a process that has died; how it did."""
+        """Wait for a dead process; returns how it ended."""
         self.process.join()
         self.connection.close()
         code = self.process.exitcode or 0
@@ -96,7 +97,7 @@ def _face_of(job: Job) -> tuple[object, ...]:
 
 
 class _Queue:
-    """Jobs by face and clip, so that a worker stays with what it has loaded as long as it can."""
+    """Jobs by face and clip, so that a worker keeps its loaded files as long as possible."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self._lines: dict[tuple[object, ...], OrderedDict[Path, deque[Job]]] = {}
@@ -110,7 +111,7 @@ class _Queue:
         self._lengths[_face_of(job)] += 1
 
     def take(self, last: Job | None) -> Job | None:
-        """The next job for a worker that had a certain one last."""
+        """The next job for a worker, given its last one."""
         face = _face_of(last) if last else None
         if face is None or not self._lengths[face]:
             face, length = max(self._lengths.items(), key=lambda item: item[1])
@@ -120,7 +121,7 @@ class _Queue:
         clip = last.clip if last and last.clip in line else next(iter(line))
         job = line[clip].popleft()
         self._lengths[face] -= 1
-        line.move_to_end(clip)  # the next worker begins another one
+        line.move_to_end(clip)  # the next worker begins with another clip
         if not line[clip]:
             del line[clip]
         return job
@@ -130,9 +131,9 @@ class Pool:
     """Runs jobs in processes of this machine.
 
     Args:
-        work: what a job is; a function that can be imported, or a partial of one.
-        workers: processes.
-        attempts: workers that a job may end before it is given up.
+        work: runs a job; a function that can be imported, or a partial of one.
+        workers: number of processes.
+        attempts: number of workers that a job may kill before it is given up.
     """
 
     def __init__(self, work: Work, workers: int, attempts: int = 3) -> None:
@@ -142,7 +143,8 @@ class Pool:
         self._false_starts = 0
 
     def results(self, jobs: Sequence[Job]) -> Iterator[Outcome]:
-        """Outcomes as they come. Leaving it early, also by an exception, stops the workers.
+        """Outcomes as they arrive. Closing the iterator early, even by an exception, stops the
+        workers.
 
         Raises:
             PoolError: no worker can be started.
@@ -158,7 +160,7 @@ class Pool:
             self._stop()
 
     def _step(self, queue: _Queue) -> Iterator[Outcome]:
-        """Wait until something happens, and see to it."""
+        """Wait for an event and handle it."""
         places = {id(w.connection): w for w in self._workers}
         ready = multiprocessing.connection.wait([w.connection for w in self._workers])
         for connection in ready:
@@ -180,7 +182,7 @@ class Pool:
             worker.give(job)
 
     def _replace(self, worker: _Worker, queue: _Queue) -> Iterator[Outcome]:
-        """Another worker for one that died, and what becomes of its job."""
+        """Replace a dead worker, and retry or fail its job."""
         how = worker.end()
         self._workers.remove(worker)
         self._false_starts = 0 if worker.ready else self._false_starts + 1
@@ -198,7 +200,7 @@ class Pool:
         self._workers.append(_Worker(self._work))
 
     def _stop(self) -> None:
-        """End every worker, at once if it has a job; half a file is deleted by who runs this."""
+        """End every worker, at once if it has a job; the caller deletes partial files."""
         for worker in self._workers:
             worker.connection.close()
             if worker.job is not None or not worker.ready:

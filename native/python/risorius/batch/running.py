@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A batch from its beginning to its end: what is done already, what comes in, what is told."""
+"""Runs a batch: skips finished jobs, collects outcomes, reports progress."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .work import run_job
 
 @dataclass
 class Report:
-    """What became of a batch."""
+    """The result of a batch."""
 
     plan: Plan
     outcomes: dict[str, Outcome] = field(default_factory=dict)
@@ -36,12 +36,12 @@ class Report:
     frames: int = 0
 
     def failed(self) -> list[Outcome]:
-        """In the plan's order."""
+        """Failed jobs in the plan's order."""
         out = [self.outcomes.get(job.name) for job in self.plan.jobs]
         return [outcome for outcome in out if outcome and outcome.error]
 
     def facts(self) -> dict[str, Any]:
-        """Plain values, for a program."""
+        """Plain values for programs."""
         failed = self.failed()
         return {
             "jobs": len(self.plan.jobs),
@@ -56,12 +56,12 @@ class Report:
 
 
 def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
-    """The jobs that are still to be done.
+    """The jobs that remain to be done.
 
     Args:
         plan: all jobs.
-        journal: of earlier runs.
-        report: takes those that are done already.
+        journal: journal of earlier runs.
+        report: receives the finished ones.
     """
     out = []
     for job in plan.jobs:
@@ -74,18 +74,18 @@ def pending(plan: Plan, journal: Journal, report: Report) -> list[Job]:
 
 
 def run(plan: Plan, *, workers: int | None, scheduler: str | None, restart: bool) -> Report:
-    """Do all jobs of a plan that are not done.
+    """Run all unfinished jobs of a plan.
 
     Args:
-        workers: processes; None for as many as there are cores.
-        scheduler: address of a Dask scheduler to use in their place.
-        restart: do everything again.
+        workers: number of processes; None: one per core.
+        scheduler: address of a Dask scheduler to use instead.
+        restart: run all jobs again.
 
     Raises:
         LockedError: another batch works in the output folder.
-        PoolError: no worker can be started, the cluster cannot be reached or has gone.
+        PoolError: no worker can be started, or the cluster cannot be reached or is gone.
         OSError: the output folder cannot be written.
-        KeyboardInterrupt: the workers have been stopped, what is done is in the journal.
+        KeyboardInterrupt: the workers were stopped; finished jobs are in the journal.
     """
     for path in plan.summary:
         fileio.check_writable(path, parents=True)
@@ -110,7 +110,7 @@ def _run(plan: Plan, workers: int | None, scheduler: str | None, restart: bool) 
             _gather(results, jobs, report, journal, progress)
     finally:
         progress.close()
-        fileio.sweep(folders)  # temporary files of workers that were killed
+        fileio.sweep(folders)  # temporary files of killed workers
         report.seconds = time.monotonic() - started
         summary.write(plan, lambda: summary.rows(plan, report.outcomes, report.reused, journal))
     return report
@@ -119,7 +119,7 @@ def _run(plan: Plan, workers: int | None, scheduler: str | None, restart: bool) 
 def _results(
     jobs: Sequence[Job], workers: int | None, scheduler: str | None, progress: Progress
 ) -> Generator[Outcome, None, None]:
-    """Where the jobs are done."""
+    """Run jobs in local processes or on a cluster."""
     if not jobs:
         return
     if scheduler is None:
@@ -147,7 +147,7 @@ def _gather(
             failed += 1
             progress.say(f"{outcome.name}: {outcome.error}")
         else:
-            # The journal comes first: after Ctrl-C it holds all that the report knows.
+            # The journal is written first, so that after Ctrl-C it holds all that the report has.
             journal.add(by_name[outcome.name], outcome)
             report.frames += int(outcome.facts.get("frames", 0))
         report.outcomes[outcome.name] = dataclasses.replace(outcome, facts={})

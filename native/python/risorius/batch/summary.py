@@ -28,13 +28,13 @@ Rows = Iterator[dict[str, Any]]
 
 
 def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal: Journal) -> Rows:
-    """A row a job, in the plan's order: done, kept (from an earlier run), failed or not done.
+    """A row per job, in the plan's order: done, kept (from an earlier run), failed or not done.
 
     Args:
         plan: all jobs.
-        outcomes: name of a job -> what became of it.
-        reused: names of the jobs that an earlier run did.
-        journal: has the facts of the jobs that are done.
+        outcomes: name of a job -> its result.
+        reused: names of the jobs finished by an earlier run.
+        journal: has the facts of finished jobs.
     """
     for job in plan.jobs:
         outcome = outcomes.get(job.name)
@@ -54,11 +54,11 @@ def rows(plan: Plan, outcomes: Mapping[str, Outcome], reused: set[str], journal:
 
 
 def write(plan: Plan, table: Callable[[], Rows]) -> None:
-    """Write the summary in each form that is asked for, row by row.
+    """Write the summary in each requested form, row by row.
 
     Args:
-        plan: names the files.
-        table: begins the rows anew; called once a file.
+        plan: has the paths.
+        table: returns the rows from the beginning; called once per file.
 
     Raises:
         OSError: a file cannot be written.
@@ -72,7 +72,7 @@ def write(plan: Plan, table: Callable[[], Rows]) -> None:
 
 
 def _write_csv(file: TextIO, table: Rows) -> None:
-    """Of lists of names how many there are; the names are in the JSON."""
+    """Lists of names appear as their length; the JSON has the names."""
     keys = ["job", "state", "clip", "character", "lod", "error", "attempts", *_COLUMNS]
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(keys)

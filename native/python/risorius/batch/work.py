@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a worker does: one job after the other, with the faces and clips of the last ones kept."""
+"""The work of a worker: one job after the other, with recent faces and clips kept loaded."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from ..baking.face import Face, load_face, prepared
 from .jobs import Job
 from .outcome import Outcome
 
-_FORMAT = 1  # version of the outputs: raising it makes all existing ones out of date
+_FORMAT = 1  # version of the outputs; raising it makes all existing outputs outdated
 _Value = TypeVar("_Value")
 
 
 class Kept(Generic[_Value]):
-    """The last few things that were made from files, by the files' contents.
+    """Keeps the last few objects made from files, by the files' content.
 
-    For threads: a cluster's worker runs several jobs at once. What two of them want at the same
-    time is made once.
+    Thread-safe, because a cluster's worker runs several jobs at once. An object that two of them
+    need at the same time is made once.
     """
 
     def __init__(self, count: int) -> None:
@@ -41,11 +41,11 @@ class Kept(Generic[_Value]):
         self._values: OrderedDict[object, _Value] = OrderedDict()
 
     def get(self, key: object, make: Callable[[], _Value]) -> _Value:
-        """The value of a key; made where it is not among the last ones, while other threads wait.
+        """The value of a key; if it is not kept, it is made while other threads wait.
 
         Args:
             key: hashable.
-            make: makes the value; what it raises is raised.
+            make: makes the value; its exceptions pass through.
         """
         with self._lock:
             if key not in self._values:
@@ -62,7 +62,7 @@ _digests: Kept[str] = Kept(4096)
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of a file, remembered while its size and time stay. Raises: OSError."""
+    """SHA-256 of a file, cached by its size and time. Raises: OSError."""
     about = path.stat()
     return _digests.get((path, about.st_size, about.st_mtime_ns), lambda: _digest(path))
 
@@ -73,7 +73,7 @@ def _digest(path: Path) -> str:
 
 
 def stamp(job: Job) -> str:
-    """A hash of all that a job's outputs depend on: clip, DNA, LOD, options, version.
+    """A hash of everything that a job's outputs depend on: clip, DNA, LOD, options, version.
 
     Raises:
         OSError: a file cannot be read.
@@ -85,7 +85,7 @@ def stamp(job: Job) -> str:
         "compile": compile_version(),
         "clip": file_digest(job.clip),
         "character": file_digest(job.character),
-        "names": [job.clip.stem, job.character.stem],  # an .npz says them
+        "names": [job.clip.stem, job.character.stem],  # an .npz contains them
         "lod": job.lod,
         "kinds": [kind for kind, _ in job.outputs],
         "options": asdict(job.options) | {"mapping": _mapping_digest(job)},
@@ -94,7 +94,7 @@ def stamp(job: Job) -> str:
 
 
 def _mapping_digest(job: Job) -> str | None:
-    """Of a mapping's file, or the name of one that comes with this version."""
+    """The digest of a mapping's file, or the name of a built-in one."""
     name = job.options.mapping
     return file_digest(Path(name)) if name and os.path.isabs(name) else name
 
@@ -112,12 +112,12 @@ def _performance(job: Job) -> Performance:
 
 
 def run_job(job: Job, threads: int = 1, version: str | None = None) -> Outcome:
-    """Do a job.
+    """Run a job.
 
     Args:
-        job: its paths must be there for whoever runs this.
-        threads: that may evaluate it.
-        version: of Risorius that gave it out, where it may be another one.
+        job: its paths must exist on the machine that runs this.
+        threads: number of threads for the evaluation.
+        version: version of the Risorius that sent the job, if it may differ.
     """
     if version not in (None, risorius.__version__):
         return Outcome(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The command line, and the one place that prints errors: a sentence on the standard error.
+"""The command line. Only this module prints errors, one sentence on the standard error.
 
-Exit codes: 0 done, 1 the input is bad, 2 the command line is bad, 130 interrupted.
+Exit codes: 0 success, 1 bad input, 2 bad command line, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -40,11 +40,13 @@ INTERRUPTED = 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command. Args: the arguments, else those of the process. Returns: the exit code."""
+    """Run a command. Args: the arguments, or None for the arguments of the process. Returns: the
+    exit code."""
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # names need not be text that a terminal can show
+        # Names may contain text that a terminal cannot show.
+        if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    # What leaves the numbers is refused where it counts; NumPy would name our lines and no file.
+    # Code that computes refuses values out of range; NumPy's warnings name our lines and no file.
     with obeyed_by_nobody(), np.errstate(all="ignore"):
         return _run(arguments)
 
@@ -62,26 +64,26 @@ def _run(arguments: Sequence[str] | None) -> int:
     except (RisoriusError, OSError, MemoryError) as error:
         place = ""
         if isinstance(error, OSError) and error.filename is None and error.errno == errno.ENOSPC:
-            place = "<stdout>: "  # errors of other files have the file's name already
+            place = "<stdout>: "  # other errors already name their file
             _drop_output()
         return _say(place + sentence(error), 2 if isinstance(error, CommandLineError) else 1)
     return code
 
 
 def _say(text: str, code: int) -> int:
-    with contextlib.suppress(OSError):  # there may be nobody to say it to
+    with contextlib.suppress(OSError):  # the standard error may be closed
         print(f"risorius: {text}", file=sys.stderr, flush=True)
     return code
 
 
 def _drop_output() -> None:
-    """Let nothing that is still buffered fail again when the interpreter ends."""
+    """Drop buffered output, so that nothing fails again when the interpreter ends."""
     with contextlib.suppress(OSError, ValueError):  # sys.stdout may have no file descriptor
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that leaves to `main` what is wrong with the value of one option."""
+    """A parser that passes wrong option values to `main`."""
 
     def error(self, message: str) -> NoReturn:
         if message.startswith("argument "):
@@ -93,8 +95,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """The parsed command line; `func` is the command.
 
     Raises:
-        CommandLineError: an option has no such value.
-        SystemExit: it makes no sense as a whole; the usage was printed.
+        CommandLineError: an option has an invalid value.
+        SystemExit: the command line is invalid as a whole; the usage was printed.
     """
     parser = _Parser(prog="risorius", description="Face rigs from DNA files.")
     parser.add_argument("--version", action="version", version=__version__)

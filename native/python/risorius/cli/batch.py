@@ -24,10 +24,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser = subparsers.add_parser(
         "batch",
         help="many clips on many characters: baked files and statistics",
-        description="Evaluates clips x characters x LODs as a JOBS.toml says, writes .npz, .csv or "
-        ".rzc files and a summary of all jobs. What is done already (same clip, DNA, options and "
-        "version, files untouched) is not done again, so an interrupted batch goes on where it "
-        "was. Exit code 1 if a job failed, 130 if interrupted.",
+        description="Evaluates clips x characters x LODs from a JOBS.toml, writes .npz, .csv or "
+        ".rzc files and a summary of all jobs. A finished job (same clip, DNA, options and "
+        "version, files untouched) is skipped, so an interrupted batch continues. The exit code is "
+        "1 if a job failed, 130 after an interrupt.",
     )
     parser.add_argument("jobs", type=Path, metavar="JOBS.toml", help="see docs/batch.md")
     where = parser.add_mutually_exclusive_group()
@@ -35,19 +35,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--workers",
         type=whole_number(1, 1024),
         metavar="N",
-        help="processes of this machine (as many as cores)",
+        help="processes on this machine (default: one per core)",
     )
     where.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="of an existing Dask cluster, e.g. tcp://host:8786, whose workers see the files by "
-        "the same paths and have this version of risorius",
+        help="scheduler of a Dask cluster, e.g. tcp://host:8786; its workers need this version of "
+        "risorius and must see the files at the same paths",
     )
     again = parser.add_mutually_exclusive_group()
     again.add_argument(
-        "--resume", action="store_true", help="do what is not done yet (this is the default)"
+        "--resume", action="store_true", help="run the jobs that are not done yet (default)"
     )
-    again.add_argument("--restart", action="store_true", help="do everything again")
+    again.add_argument("--restart", action="store_true", help="run all jobs again")
     parser.add_argument("--dry-run", action="store_true", help="list the jobs, do none")
     parser.add_argument("--json", action="store_true", help="for a program")
     parser.set_defaults(func=run)
@@ -64,18 +64,18 @@ def run(args: argparse.Namespace) -> int:
             )
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            "interrupted; what is done is kept, the same command goes on"
+            "interrupted: finished files are kept, and the same command goes on from here"
         ) from None
     return tell(report, as_json=args.json)
 
 
 def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
-    """Print the jobs, and which of them are done; 0, the exit code.
+    """Print the jobs, and mark the finished ones. Returns the exit code 0.
 
     Args:
         plan: all jobs.
-        restart: none counts as done.
-        as_json: for programs.
+        restart: treat no job as done.
+        as_json: print JSON.
     """
     report, journal = Report(plan), Journal(plan.journal)
     if not restart:
@@ -102,11 +102,11 @@ def dry_run(plan: Plan, *, restart: bool, as_json: bool) -> int:
 
 
 def tell(report: Report, *, as_json: bool) -> int:
-    """Print what became of a batch; the exit code, 1 where a job failed.
+    """Print the results of a batch. Returns the exit code, 1 if a job failed.
 
     Args:
-        report: of the batch.
-        as_json: for programs.
+        report: report of the batch.
+        as_json: print JSON.
     """
     failed = report.failed()
     if as_json:
@@ -125,7 +125,7 @@ def tell(report: Report, *, as_json: bool) -> int:
 
 @contextlib.contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """A polite kill stops a batch as cleanly as Ctrl-C does."""
+    """SIGTERM stops a batch as cleanly as Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius bench: how fast this machine evaluates a face."""
+"""risorius bench: evaluation speed of a face on this machine."""
 
 from __future__ import annotations
 
@@ -39,43 +39,47 @@ cold       from memory, after other work has had the caches; crowd, clip: many p
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "bench",
-        help="how fast this machine evaluates a face",
+        help="measure the evaluation speed of a face",
         description="Measures the evaluator against a plain sparse matrix (CSR) in the same run: "
-        "medians, one core, never the same frame twice in a row. Takes about a minute; close what "
-        "else runs.",
+        "medians, one core, never the same frame twice in a row. Takes about a minute; close "
+        "other programs.",
     )
     parser.add_argument("file", type=Path)
     parser.add_argument(
         "--frames",
         type=Path,
         metavar="FRAMES.npz",
-        help=f"float32[frames, raw controls] as {', '.join(FRAMES)}; otherwise their like is made",
+        help=f"float32[frames, raw controls] as {', '.join(FRAMES)}; default: generated frames",
     )
-    parser.add_argument("--sweep", action="store_true", help="how cost grows, as CSV")
-    parser.add_argument("--quick", action="store_true", help="seconds, not a minute, and less sure")
+    parser.add_argument(
+        "--sweep", action="store_true", help="print the cost by problem size as CSV"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="seconds instead of a minute, less accurate"
+    )
     parser.set_defaults(func=run)
 
 
 def program() -> Path | None:
-    """The benchmark, beside this Python's own programs or on PATH: no wheel holds it."""
+    """The benchmark program, in this Python's scripts folder or on PATH; no wheel contains it."""
     places = [sysconfig.get_path("scripts"), *os.get_exec_path()]
     found = shutil.which("rig_bench", path=os.pathsep.join(places))
     return Path(found) if found else None
 
 
 def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
-    """The frames of an .npz as files for the benchmark.
+    """Write the frames of an .npz as files for the benchmark.
 
     Args:
         source: the .npz.
-        raw_count: raw controls of the face, so columns of its frames.
-        folder: where the files go.
+        raw_count: number of raw controls of the face, and of columns of the frames.
+        folder: folder of the files.
 
     Returns:
         The names of the files, in the order of FRAMES.
 
     Raises:
-        InputError: no .npz, or an array that is missing or has another shape.
+        InputError: no .npz, or an array is missing or has a wrong shape.
     """
     try:
         return _export_frames(source, raw_count, folder)
@@ -86,7 +90,7 @@ def export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
 
 
 def _export_frames(source: Path, raw_count: int, folder: Path) -> list[str]:
-    opened = io.BytesIO(read_file(source, MESH))  # a pipe cannot be searched for a directory
+    opened = io.BytesIO(read_file(source, MESH))  # a pipe cannot seek to the directory
     hold_arrays(opened)
     return _write_frames(source, opened, raw_count, folder)
 

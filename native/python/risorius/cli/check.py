@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius check: everything that is wrong or odd in some files."""
+"""risorius check: everything wrong or odd in files."""
 
 from __future__ import annotations
 
@@ -15,26 +15,28 @@ from ..rigs.joint_controls import joint_controls
 from .files import InputError, from_json, summary
 
 _DESCRIPTION = """\
-Prints a line for everything that is wrong (an error: the file is refused) or odd (a warning) in
-each file, with its byte and its field, and one line about the file as a whole. A file whose name
-ends in .json is read as JSON. Exit code 1 if a file has an error."""
+Prints a line for each error (the file is refused) and each warning (the file is odd), with its
+byte and its field, and one line for the file as a whole. A file named *.json is read as JSON. The
+exit code is 1 if a file has an error."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "check", help="what is wrong or odd in files", description=_DESCRIPTION
+        "check", help="find errors and oddities in files", description=_DESCRIPTION
     )
     parser.add_argument("files", nargs="+", metavar="FILE")
-    parser.add_argument("--json", action="store_true", help="for a program")
-    parser.add_argument("--strict", action="store_true", help="a warning fails like an error")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--strict", action="store_true", help="treat warnings as errors")
     parser.add_argument(
-        "--mix", action="store_true", help="and whether each can be mixed with the first one"
+        "--mix",
+        action="store_true",
+        help="also check whether each file can be mixed with the first",
     )
     parser.set_defaults(func=run)
 
 
 def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Finding:
-    """An error that ended the reading; its text without the file's name, which stands before."""
+    """The error that stopped the reading, without the file's name, which is printed before it."""
     text = str(error).removeprefix(f"{name}: ")
     where, offset = getattr(error, "where", ""), getattr(error, "offset", None)
     text = text.removesuffix(f" (byte {offset})").removesuffix(f" [{where}]")
@@ -42,7 +44,7 @@ def _error(name: str, error: Exception, code: str = "io_read") -> risorius.Findi
 
 
 def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
-    """The Dna of a JSON file, if it is one, and what is wrong or odd in it."""
+    """The Dna of a JSON file, or None, and its findings."""
     try:
         dna = from_json(name)
     except InputError as error:
@@ -56,7 +58,7 @@ def check_json(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
-    """The Dna's definition, if it can be read, and what is wrong or odd in the file."""
+    """The Dna's definition, or None, and the file's findings."""
     try:
         found = risorius.check(name)
         if any(finding.is_error for finding in found):
@@ -68,7 +70,7 @@ def check_dna(name: str) -> tuple[risorius.Dna | None, list[risorius.Finding]]:
 
 
 def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
-    """Warnings on raw controls that hold rotations of joints, and that nothing can fill."""
+    """Warnings about raw controls that hold rotations of joints but that nothing can fill."""
     where = "definition.raw_control_names"
     return [
         risorius.Finding(False, "invalid_value", where, None, text)
@@ -77,11 +79,11 @@ def _joint_controls(dna: risorius.Dna) -> list[risorius.Finding]:
 
 
 def examine(name: str, strict: bool) -> dict[str, Any]:
-    """Everything that the command prints of one file, as plain values.
+    """All results for one file as plain values.
 
     Args:
-        name: of the file; one that ends in .json is read as JSON, else as DNA.
-        strict: warnings make it not ok too.
+        name: name of the file; *.json is read as JSON, others as DNA.
+        strict: a warning makes the file not ok.
     """
     dna, found = (check_json if name.lower().endswith(".json") else check_dna)(name)
     errors = sum(finding.is_error for finding in found)
@@ -96,7 +98,7 @@ def examine(name: str, strict: bool) -> dict[str, Any]:
 
 
 def lines(facts: dict[str, Any]) -> list[str]:
-    """The facts about one file for a person, as a compiler prints them."""
+    """The results for one file as lines in the style of a compiler."""
     out = []
     for finding in facts["findings"]:
         place = [facts["file"]]
@@ -116,7 +118,7 @@ def lines(facts: dict[str, Any]) -> list[str]:
 
 
 def _mixes(everything: list[dict[str, Any]], *, quiet: bool) -> None:
-    """Adds to what is said of sound files whether they can be mixed with the first of them."""
+    """Add to each sound file whether it can be mixed with the first one."""
     sound = [facts for facts in everything if facts["ok"]]
     first = risorius.load(sound[0]["file"]) if sound else None
     for facts in sound[1:]:

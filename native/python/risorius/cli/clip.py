@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius clip: animation of other software, converted, looked at, mapped."""
+"""risorius clip: convert, inspect and map animation of other software."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .ranges import add_learn, with_ranges
 
 OUTPUTS = (".rzc", ".csv", ".json")
 _MAPPING = (
-    "a mapping by its name (risorius clip mappings) or a TOML file; default: the one that fits"
+    "name of a mapping (see risorius clip mappings) or a TOML file; default: the mapping that fits"
 )
 
 
@@ -29,7 +29,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "clip",
         help="animation of other software as clips of a rig's controls",
         description="Reads Live Link Face takes, tables and JSON of named curves, mouth shapes of "
-        "Rhubarb, Papagayo and Moho, glTF and FBX; what a curve moves is said by a mapping.",
+        "Rhubarb, Papagayo and Moho, glTF and FBX; a mapping assigns curves to controls.",
     )
     commands = parser.add_subparsers(dest="clip_command", required=True)
     _add_convert(commands)
@@ -42,9 +42,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = commands.add_parser(
         "convert",
-        help="a file of animation as .rzc, .csv or .json of raw controls",
-        description="What is asked for is done in this order: mapping, range, neutral, gain and "
-        "offset, repeats, gaps, smoothing, mirror, cut, rate, shift.",
+        help="convert an animation file to raw controls: .rzc, .csv or .json",
+        description="The steps run in this order: mapping, range, neutral, gain and offset, "
+        "repeats, gaps, smoothing, mirror, cut, rate, shift.",
     )
     _add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
@@ -54,7 +54,7 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_meaning(parser: argparse.ArgumentParser) -> None:
-    """Options that say how the values of IN are understood."""
+    """Add the options that interpret the values of IN."""
     parser.add_argument("--mapping", metavar="M", help=_MAPPING)
     parser.add_argument(
         "--rig", type=Path, metavar="DNA", help="keep only what this rig has; its GUI table"
@@ -86,96 +86,112 @@ def _add_meaning(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_steps(parser: argparse.ArgumentParser) -> None:
-    """Options that change the clip, in the order in which they do, and the report."""
+    """Add the options that change the clip, in the order of their effect, and the report."""
     parser.add_argument(
-        "--neutral", metavar="A[:B]", help="frame or frames of a neutral face, which become 0"
+        "--neutral",
+        metavar="A[:B]",
+        help="frame or frames of the neutral face; their values become 0",
     )
-    for name, what in (("gain", "factor"), ("offset", "what is added")):
+    for name, what in (("gain", "factor"), ("offset", "value to add")):
         parser.add_argument(
             f"--{name}",
             action="append",
             default=[],
             metavar="PATTERN=N",
-            help=f'{what} for controls, e.g. "jaw*=1.2"; may be given again',
+            help=f'{what} for controls, e.g. "jaw*=1.2"; may be repeated',
         )
     parser.add_argument(
         "--drop-repeats",
         action="store_true",
-        help="leave out frames that only repeat the one before",
+        help="remove frames that repeat the frame before",
     )
     parser.add_argument(
-        "--fill-gaps", action="store_true", help="even frames; straight across missing ones"
+        "--fill-gaps",
+        action="store_true",
+        help="make the frames evenly spaced; interpolate missing ones",
     )
     parser.add_argument(
         "--smooth",
         metavar="S|KIND:S",
-        help="seconds, e.g. 0.1: peaks are kept; gaussian:0.03; one-euro:1.5, a cutoff in Hz",
+        help="seconds, e.g. 0.1 (keeps peaks); gaussian:0.03; one-euro:1.5 (cutoff in Hz)",
     )
-    parser.add_argument("--mirror", action="store_true", help="left for right")
-    parser.add_argument("--cut", metavar="A:B", help="from A to B seconds")
+    parser.add_argument("--mirror", action="store_true", help="swap left and right")
+    parser.add_argument("--cut", metavar="A:B", help="keep seconds A to B")
     parser.add_argument(
-        "--rate", type=number(0.01, 1e6), metavar="FPS", help="frames a second of OUT"
-    )
-    parser.add_argument(
-        "--shift", type=number(-1e9, 1e9), default=0.0, metavar="S", help="seconds later"
+        "--rate", type=number(0.01, 1e6), metavar="FPS", help="frames per second of OUT"
     )
     parser.add_argument(
-        "--report", action="store_true", help="print what was mapped and what was not, to stdout"
+        "--shift",
+        type=number(-1e9, 1e9),
+        default=0.0,
+        metavar="S",
+        help="shift the clip by S seconds",
+    )
+    parser.add_argument(
+        "--report", action="store_true", help="print mapped and unmapped curves to stdout"
     )
 
 
 def _add_input(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("input", type=Path, metavar="IN")
     parser.add_argument(
-        "--kind", choices=tuple(importing.KINDS), help="what IN is (default: told from its content)"
+        "--kind",
+        choices=tuple(importing.KINDS),
+        help="format of IN (default: detected from its content)",
     )
     parser.add_argument(
         "--input-rate",
         type=number(0.01, 1e6),
         metavar="FPS",
-        help="frames a second of IN, where its time is a frame number or is not there",
+        help="frames per second of IN, if its times are frame numbers or missing",
     )
     parser.add_argument(
         "--timecode-rate",
         type=number(0.01, 1e6),
         metavar="FPS",
-        help="of timecodes that do not tell it",
+        help="frames per second of timecodes that do not state it",
     )
     parser.add_argument(
         "--time-unit",
         choices=importing.TIME_UNITS,
-        help="what the times of a table or a JSON count in, where they do not say it; rows: they "
-        "are left aside, and each row is a frame at --input-rate",
+        help="unit of the times of a table or a JSON that does not state it; rows: ignore the "
+        "times, each row is a frame at --input-rate",
     )
     parser.add_argument(
-        "--take", metavar="NAME", help="animation of a glTF or FBX, by name or number (the first)"
+        "--take",
+        metavar="NAME",
+        help="animation of a glTF or FBX, by name or number (default: the first)",
     )
 
 
 def _add_info(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = commands.add_parser("info", help="what a file of animation holds")
+    parser = commands.add_parser("info", help="show the content of an animation file")
     _add_input(parser)
     parser.set_defaults(func=run_info)
 
 
 def _add_mappings(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = commands.add_parser("mappings", help="the mappings that come with Risorius")
-    parser.add_argument("--write", metavar="NAME", help="copy one for editing, to --output")
+    parser = commands.add_parser("mappings", help="list the mappings of Risorius")
+    parser.add_argument("--write", metavar="NAME", help="copy a mapping to --output for editing")
     parser.add_argument(
-        "-o", "--output", type=Path, metavar="M.toml", help="default: NAME.toml; never replaced"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="M.toml",
+        help="default: NAME.toml; an existing file is never replaced",
     )
     parser.set_defaults(func=run_mappings)
 
 
 def _add_check(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    parser = commands.add_parser("check", help="a mapping against the controls of a rig")
+    parser = commands.add_parser("check", help="check a mapping against the controls of a rig")
     parser.add_argument("mapping", metavar="M.toml")
     parser.add_argument("--rig", type=Path, required=True, metavar="DNA")
     parser.set_defaults(func=run_check)
 
 
 def load(args: argparse.Namespace) -> importing.Imported:
-    """What IN holds; a clip of Risorius is of raw controls already."""
+    """Read IN; a clip of Risorius already has raw controls."""
     if args.input.suffix.lower() == ".rzc":
         return importing.Imported(Clip.load(args.input), "clip", "controls", str(args.input))
     return importing.read(
@@ -225,10 +241,10 @@ def run_convert(args: argparse.Namespace) -> int:
 
 
 def _steps(args: argparse.Namespace) -> list[Callable[[Clip], Clip]]:
-    """What is to be done after the mapping, in order.
+    """The steps after the mapping, in order.
 
     Raises:
-        CommandLineError: an option of another form.
+        CommandLineError: an option has an invalid value.
     """
     steps: list[Callable[[Clip], Clip]] = []
     try:
@@ -286,7 +302,7 @@ def _pair(text: str, option: str, number: Callable[[str, int], float]) -> tuple[
 
 
 def _save(clip: Clip, path: Path) -> None:
-    """By the suffix."""
+    """Save in the format of the suffix."""
     suffix = path.suffix.lower()
     if suffix == ".rzc":
         clip.save(path)

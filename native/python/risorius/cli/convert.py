@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius convert: a DNA file as JSON and back, of another version, cut, in other axes."""
+"""risorius convert: a DNA file to JSON and back, with another version, fewer layers, other axes."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from .files import (
 
 _NEWEST = 8
 _DESCRIPTION = """\
-Reads INPUT and writes OUTPUT: .dna or .json by the suffix of each, "-" is the standard input or
-output. OUTPUT may be there already and is replaced as a whole or, after an error, not at all."""
-# Options of the command -> arguments of Dna.convert.
+Reads INPUT and writes OUTPUT. The suffix of each decides: .dna or .json; "-" is the standard input
+or output. An existing OUTPUT is replaced as a whole or, after an error, not at all."""
+# Option of the command -> argument of Dna.convert.
 _SYSTEM = {
     "axes": "axes",
     "rotation_sequence": "rotation_sequence",
@@ -46,19 +46,21 @@ _SYSTEM = {
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "convert", help="to and from JSON, another version, other axes", description=_DESCRIPTION
+        "convert",
+        help="convert to and from JSON, to another version or other axes",
+        description=_DESCRIPTION,
     )
     parser.add_argument("input", metavar="INPUT")
     parser.add_argument("output", metavar="OUTPUT")
-    parser.add_argument("--from", dest="input_kind", choices=KINDS, help="what INPUT is")
-    parser.add_argument("--to", dest="output_kind", choices=KINDS, help="what OUTPUT becomes")
+    parser.add_argument("--from", dest="input_kind", choices=KINDS, help="format of INPUT")
+    parser.add_argument("--to", dest="output_kind", choices=KINDS, help="format of OUTPUT")
     parser.add_argument(
         "--version",
         choices=[f"2.{minor}" for minor in range(1, _NEWEST + 1)],
-        help="of the file (default: that of INPUT)",
+        help="version of OUTPUT (default: the version of INPUT)",
     )
-    parser.add_argument("--layers", metavar="NAMES", help="only these, e.g. behavior,geometry")
-    parser.add_argument("--lods", metavar="LODS", help="only these, e.g. 0 or 0-2 or 0,3,5")
+    parser.add_argument("--layers", metavar="NAMES", help="layers to keep, e.g. behavior,geometry")
+    parser.add_argument("--lods", metavar="LODS", help="LODs to keep, e.g. 0 or 0-2 or 0,3,5")
     parser.add_argument(
         "--unknown-layers",
         choices=("preserve", "ignore"),
@@ -69,7 +71,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--indent", type=whole_number(0, 8), metavar="N", help="spaces per level of JSON, 0 to 8"
     )
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
-    _add_system(parser.add_argument_group("coordinates of the result (default: those of INPUT)"))
+    _add_system(
+        parser.add_argument_group("coordinates of the result (default: the coordinates of INPUT)")
+    )
     parser.set_defaults(func=run)
 
 
@@ -82,13 +86,13 @@ def _add_system(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--rotation-signs", nargs=3, type=int, choices=(1, -1), metavar=("X", "Y", "Z")
     )
-    group.add_argument("--winding", choices=("ccw", "cw"), help="of the faces")
+    group.add_argument("--winding", choices=("ccw", "cw"), help="winding of the faces")
     group.add_argument("--translation-unit", choices=("cm", "m"))
     group.add_argument("--rotation-unit", choices=("degrees", "radians"))
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before the file is looked at."""
+    """Raises CommandLineError for wrong options, before the file is opened."""
     if args.indent is not None and args.output_kind != "json":
         raise CommandLineError("--indent: only JSON is indented")
     if not args.force:
@@ -110,11 +114,11 @@ def warnings_as_lines(name: str) -> Iterator[None]:
 
 
 def cut(dna: risorius.Dna, args: argparse.Namespace) -> risorius.Dna:
-    """The layers and LODs of dna that the options in args ask for.
+    """`dna` reduced to the layers and LODs in args.
 
     Raises:
-        DnaError: the layers that are left make no file.
-        CommandLineError: layers or LODs that are not there.
+        DnaError: the remaining layers make no file.
+        CommandLineError: a layer or LOD does not exist.
     """
     if args.layers is not None or args.unknown_layers == "ignore":
         names = [name.strip() for name in (args.layers or "all").split(",")]
@@ -140,12 +144,12 @@ def _writable(minor: int) -> int:
 
 
 def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
-    """The version to write when none was asked for; a word is printed where it is not the source's.
+    """The version to write if no option names one; prints a line if it differs from the source's.
 
     Args:
         source: the file that was read.
-        result: what is to be written.
-        turned: whether its axes or units were changed.
+        result: the Dna to write.
+        turned: whether its axes or units changed.
     """
     minor = _writable(result.version)
     signed = result.rotation_sequence != "xyz" or -1 in result.rotation_signs
@@ -158,14 +162,14 @@ def version_of(source: risorius.Dna, result: risorius.Dna, turned: bool) -> str:
 
 
 def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dna, bytes]:
-    """The result as it is when read back, and its bytes as a DNA file.
+    """The result as it is after reading back, and its bytes as a DNA file.
 
     Args:
         source: the file that was read.
         args: the options of the command.
 
     Raises:
-        InputError: the result could not be read back.
+        InputError: the result cannot be read back.
     """
     dna = cut(source, args)
     target: dict[str, Any] = {
@@ -184,7 +188,7 @@ def convert(source: risorius.Dna, args: argparse.Namespace) -> tuple[risorius.Dn
 
 
 def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
-    """The JSON of dna in UTF-8, each level indented by so many spaces; None: as Dna.to_json does.
+    """Dna as JSON in UTF-8, indented by `indent` spaces per level; None: the format of Dna.to_json.
 
     Args:
         dna: any.
@@ -192,20 +196,20 @@ def json_text(dna: risorius.Dna, indent: int | None) -> bytes:
     """
     text = dna.to_json()
     if indent is not None and indent != 1:
-        # Dna.to_json begins each line with one space per level, and no text holds a line's end.
+        # Dna.to_json indents by one space per level, and no string in it contains a line break.
         text = re.sub(r"^ +", lambda spaces: spaces[0] * indent, text, flags=re.MULTILINE)
     return text.encode()
 
 
 def write(name: str, data: bytes) -> None:
-    """Write a file whole or not at all; devices and pipes take the bytes as they come.
+    """Write a file whole or not at all; a device or a pipe gets the bytes directly.
 
     Args:
-        name: of the file; "-": the standard output.
-        data: its bytes.
+        name: name of the file; "-": the standard output.
+        data: the bytes to write.
 
     Raises:
-        InputError: it cannot be written.
+        InputError: the file cannot be written.
     """
     try:
         if name == "-":

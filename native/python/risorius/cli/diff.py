@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius info --diff: what differs between two files, in words."""
+"""risorius info --diff: differences between two files, in words."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from ..base.words import counted
 from ..diff import Difference, compare
 from .files import CommandLineError, InputError, kind_of, read, summary
 
-_LINES = 8  # so many lines for one field are printed
+_LINES = 8  # longest list of lines per field
 
 
 def same_but_for(a: str, b: str) -> Difference | None:
-    """Where the bytes of two DNA files of one content differ, which no layer reads; None: nowhere.
+    """The first difference of two DNA files with equal content, in bytes that no layer reads; or
+    None.
 
     Args:
         a, b: names of the files.
@@ -28,16 +29,16 @@ def same_but_for(a: str, b: str) -> Difference | None:
     left, right = (np.frombuffer(one, np.uint8, short) for one in data)
     other = left != right
     first = int(np.argmax(other)) if other.any() else short
-    text = f"the same content, but other bytes from byte {first} on, in what no layer reads"
+    text = f"the same content, but other bytes from byte {first} on, in a part that no layer reads"
     return Difference("file", "bytes", text)
 
 
 def page(found: list[Difference], everything: bool) -> str:
-    """The differences for a person, by layer and field.
+    """The differences as text, by layer and field.
 
     Args:
-        found: of `diff.compare`.
-        everything: lists are not shortened.
+        found: result of `diff.compare`.
+        everything: do not shorten lists.
     """
     layers: dict[str, dict[str, list[str]]] = {}
     for layer, field, text in found:
@@ -54,20 +55,20 @@ def page(found: list[Difference], everything: bool) -> str:
 
 
 def run(a: str, b: str, *, everything: bool, as_json: bool) -> int:
-    """Print what differs; the exit code, 0 for nothing and 1 for something.
+    """Print the differences. Returns the exit code: 0 for none, 1 for some.
 
     Args:
         a, b: names of the files, .dna or .json.
-        everything: lists are not shortened.
-        as_json: for programs.
+        everything: do not shorten lists.
+        as_json: print JSON.
 
     Raises:
-        CommandLineError: a file cannot be used.
+        CommandLineError: a file cannot be read.
     """
     try:
         kinds = [kind_of(name, None, "another name") for name in (a, b)]
         rig_a, rig_b = read(a, kinds[0]), read(b, kinds[1])
-    except InputError as error:  # 1 is "they differ", as of diff
+    except InputError as error:  # 1 means "they differ", as in diff
         raise CommandLineError(str(error)) from error
     found = compare(rig_a, rig_b, everything or as_json)
     if not found and kinds == ["dna", "dna"] and (bytes_differ := same_but_for(a, b)):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""risorius edit: a DNA file made into another one. regroup: its joint groups made anew. lighten:
-fewer joints, correctives and levels of detail."""
+"""risorius edit: change a DNA file. regroup: rebuild its joint groups. lighten: fewer joints,
+correctives and LODs."""
 
 from __future__ import annotations
 
@@ -41,12 +41,11 @@ from .files import (
 )
 
 _DESCRIPTION = """\
-Joints that the same controls drive come together in dense joint groups, whatever the groups of
-INPUT are, and small coefficients that a control has among joints foreign to it are taken out.
-Prints what that changed: sizes, the largest change of any joint with every raw control at 1 and in
-random combinations, the time of an evaluation.
-.dna or .json by the suffix, "-" is a .dna on the standard input or output. OUTPUT may be there
-already and is replaced as a whole or, after an error, not at all."""
+Puts joints with the same controls into one dense joint group, whatever the groups of INPUT are, and
+removes small coefficients of a control on joints foreign to it. Prints sizes, the largest change of
+any joint with every raw control at 1 and in random combinations, and the time of an evaluation.
+The suffix decides: .dna or .json; "-" is a .dna on the standard input or output. An existing OUTPUT
+is replaced as a whole or, after an error, not at all."""
 _CHANGES = {
     "translation_mm": ("a joint against its parent", "mm"),
     "rotation_degrees": ("a joint's rotation", "degrees"),
@@ -55,17 +54,17 @@ _CHANGES = {
 }
 _PLOTS = (".png", ".svg")
 _LIGHTEN = """\
-A finished face with fewer joints, correctives and levels of detail, on which the animation of the
-first plays on: controls keep their names and numbers, joints that stay keep theirs and their
-motions. Joints leave that others can stand for; weights are fitted anew over all expressions.
-Correctives leave that move vertices least. Prints sizes, the time of an evaluation, and how far
-each expression is off; --report writes all expressions. See docs/authoring.md."""
+Reduces joints, correctives and LODs of a finished face. Animation of INPUT still plays: controls
+keep their names and numbers, remaining joints keep their names and motions. It removes joints that
+other joints can replace, refits the skin weights over all expressions, and removes the correctives
+that move vertices least. Prints sizes, the time of an evaluation and the worst expressions;
+--report writes the error of every expression. See docs/authoring.md."""
 _REPORTS = (".json", ".csv")
-_WORST = 20  # expressions that are printed
+_WORST = 20  # number of expressions to print
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    edits = subparsers.add_parser("edit", help="make a DNA file into another one")
+    edits = subparsers.add_parser("edit", help="change a DNA file")
     kinds = edits.add_subparsers(dest="kind", required=True)
     _add_regroup(kinds)
     _add_lighten(kinds)
@@ -73,7 +72,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "regroup", help="dense joint groups without outliers", description=_DESCRIPTION
+        "regroup",
+        help="rebuild joint groups as dense groups without outliers",
+        description=_DESCRIPTION,
     )
     parser.add_argument("input", metavar="INPUT")
     parser.add_argument("output", metavar="OUTPUT")
@@ -82,72 +83,76 @@ def _add_regroup(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]
         default="0",
         metavar="T",
         help="coefficients with less effect are small: T mm, T degrees, T per cent of scale; or "
-        "MM,DEGREES,SCALE (default 0: none is, the face stays exactly as it was)",
+        "MM,DEGREES,SCALE (default 0: no coefficient is small, the face stays exactly the same)",
     )
     parser.add_argument(
         "--foreign-share",
         type=number(0.0, 1.0),
         default=0.25,
         metavar="S",
-        help="a control is foreign to a region of which it moves at most this share (0.25)",
+        help="a control is foreign to a region if it moves at most this share of it (0.25)",
     )
     parser.add_argument(
         "--regions",
         metavar="FILE",
-        help="JSON or TOML: a list of joint names for each region (default: found from what "
-        "drives the joints, as for joints that the file leaves out)",
+        help="JSON or TOML: a list of joint names for each region (default: found from the "
+        "controls that drive each joint, as for joints missing in the file)",
     )
     parser.add_argument(
         "--combinations",
         type=whole_number(0, 1_000_000),
         default=200,
         metavar="N",
-        help="random poses to compare (200)",
+        help="number of random poses to compare (200)",
     )
     parser.add_argument(
-        "--seed", type=whole_number(0), default=0, metavar="N", help="of those poses"
+        "--seed", type=whole_number(0), default=0, metavar="N", help="seed of the random poses"
     )
-    parser.add_argument("--plot", metavar="PICTURE", help="before and after, .png or .svg")
+    parser.add_argument("--plot", metavar="PICTURE", help="plot before and after, .png or .svg")
     parser.add_argument(
-        "--dpi", type=whole_number(40, 600), default=150, help="of the picture, 40 to 600"
+        "--dpi", type=whole_number(40, 600), default=150, help="resolution of the plot, 40 to 600"
     )
-    parser.add_argument("--json", action="store_true", help="the report for a program")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
     parser.set_defaults(func=run)
 
 
 def _add_lighten(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "lighten", help="fewer joints, correctives and levels", description=_LIGHTEN
+        "lighten", help="reduce joints, correctives and LODs", description=_LIGHTEN
     )
     parser.add_argument("input", metavar="INPUT")
     parser.add_argument("-o", "--output", required=True, metavar="OUTPUT", help=".dna or .json")
-    parser.add_argument("--joints", type=whole_number(1, 65_535), metavar="N", help="N in all")
-    parser.add_argument("--correctives", type=whole_number(0, 65_535), metavar="N", help="N in all")
-    parser.add_argument("--lods", metavar="LODS", help="only these, e.g. 0 or 0-2 or 0,2,4")
+    parser.add_argument("--joints", type=whole_number(1, 65_535), metavar="N", help="N in total")
     parser.add_argument(
-        "--keep", metavar="NAMES", default="", help="joints that stay as well, apart by commas"
+        "--correctives", type=whole_number(0, 65_535), metavar="N", help="N in total"
+    )
+    parser.add_argument("--lods", metavar="LODS", help="LODs to keep, e.g. 0 or 0-2 or 0,2,4")
+    parser.add_argument(
+        "--keep",
+        metavar="NAMES",
+        default="",
+        help="joints to keep in any case, separated by commas",
     )
     parser.add_argument(
         "--shapes",
         type=number(0.0, 1000.0),
         metavar="MM",
-        help="blend shapes hold what vertices are further off than this (default: they hold "
-        "nothing new)",
+        help="blend shapes correct vertices with a larger error than this (default: no new deltas)",
     )
     parser.add_argument(
-        "--report", metavar="FILE", help="the error of each expression: .json or .csv"
+        "--report", metavar="FILE", help="write the error of each expression: .json or .csv"
     )
-    parser.add_argument("--json", action="store_true", help="all of it for a program")
+    parser.add_argument("--json", action="store_true", help="print the report as JSON")
     parser.add_argument("--force", action="store_true", help="OUTPUT may be INPUT itself")
     parser.set_defaults(func=run_lighten)
 
 
 def parse_threshold(text: str) -> float | list[float]:
-    """One number, or three.
+    """Parse one number, or three.
 
     Raises:
-        CommandLineError: a text of another form.
+        CommandLineError: not one or three numbers.
     """
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -161,7 +166,7 @@ def parse_threshold(text: str) -> float | list[float]:
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before the file is looked at."""
+    """Raises CommandLineError for wrong options, before the file is opened."""
     if args.plot is not None and Path(args.plot).suffix.lower() not in _PLOTS:
         raise CommandLineError(
             f"--plot: a name ending in {' or '.join(_PLOTS)} was expected, found {args.plot!r}"
@@ -172,11 +177,11 @@ def complain(args: argparse.Namespace) -> None:
 
 
 def read_regions(name: str) -> edit.Regions:
-    """Joint names or indices of each region, from {"eye": ["FACIAL_L_Eye", ...], ...}, also below
-    a lone key "regions", or without names [["FACIAL_L_Eye", ...], ...].
+    """Joint names or indices of each region: {"eye": ["FACIAL_L_Eye", ...], ...}, the same below a
+    single key "regions", or without names [["FACIAL_L_Eye", ...], ...].
 
     Raises:
-        InputError: not JSON or TOML, or of another form.
+        InputError: not JSON or TOML, or another structure.
     """
     data = read_bytes(name, TEXT)
     try:
@@ -184,7 +189,7 @@ def read_regions(name: str) -> edit.Regions:
         found = toml.parse(text) if name.lower().endswith(".toml") else json.loads(text)
     except RecursionError as error:
         raise InputError(f"{label(name)}: not JSON that can be read: nested too deeply") from error
-    except ValueError as error:  # of UTF-8, JSON or TOML
+    except ValueError as error:  # from UTF-8, JSON or TOML
         raise InputError(f"{label(name)}: {error}") from error
     if isinstance(found, dict) and list(found) == ["regions"]:
         found = found["regions"]
@@ -204,10 +209,10 @@ def _sizes(sizes: edit.GroupSizes) -> dict[str, int]:
 
 
 def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
-    """Everything that the command prints, as plain values.
+    """All results of the command as plain values.
 
     Args:
-        report: of the regrouping.
+        report: report of the regrouping.
         dna: the face, for the names of its joints.
     """
     changes = {
@@ -228,7 +233,7 @@ def facts_of(report: edit.RegroupReport, dna: risorius.Dna) -> dict[str, Any]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The facts for a person."""
+    """The results as text."""
     out = [f"{'':<22}{'before':>12}{'after':>12}"]
     titles = {"groups": "joint groups", "rows": "rows", "coefficients": "coefficients stored",
               "nonzero": "coefficients not 0"}  # fmt: skip
@@ -253,10 +258,10 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def _plot(args: argparse.Namespace, before: risorius.Dna, after: bytes) -> None:
-    """Writes the picture.
+    """Write the plot.
 
     Raises:
-        InputError: no Matplotlib, or the file cannot be written.
+        InputError: Matplotlib is missing, or the file cannot be written.
     """
     from ..plot import before_after
     from ..plot.content.facts import gather
@@ -355,11 +360,11 @@ def run_lighten(args: argparse.Namespace) -> int:
 
 
 def report_file(report: LightenReport, name: str) -> bytes:
-    """All expressions as a file.
+    """The report on all expressions as a file.
 
     Args:
-        report: of lighten.
-        name: of the file: .csv has a row for each expression, .json all else too.
+        report: report of lighten.
+        name: name of the file: .csv has a row per expression, .json also the rest.
     """
     if not name.lower().endswith(".csv"):
         return (json.dumps(asdict(report), indent=2) + "\n").encode()
@@ -374,7 +379,7 @@ def report_file(report: LightenReport, name: str) -> bytes:
 
 
 def lighten_lines(report: LightenReport) -> list[str]:
-    """The report for a person: sizes, and the expressions that are furthest off."""
+    """The report as text: sizes, and the expressions with the largest errors."""
     titles = {
         "joints": "joints", "correctives": "correctives", "levels": "levels of detail",
         "meshes": "meshes", "channels": "blend shape channels", "deltas": "deltas",
@@ -407,6 +412,6 @@ def lighten_lines(report: LightenReport) -> list[str]:
 
 
 def _short(name: str) -> str:
-    """Names of controls without their prefix, a corrective of many as its first four."""
+    """Control names without their prefix; a corrective of many controls shows its first four."""
     parts = [part.rpartition(".")[2] for part in name.split(" + ")]
     return " + ".join(parts[:4]) + (f" + {len(parts) - 4} more" if len(parts) > 4 else "")

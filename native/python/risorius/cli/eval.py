@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius eval: the pose that some control values give, or every frame of a clip."""
+"""risorius eval: the pose of some control values, or every frame of a clip."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from . import eval_clip
 from .files import CommandLineError, whole_number
 
 ATTRIBUTES = ("tx", "ty", "tz", "rx", "ry", "rz", "sx", "sy", "sz")
-_NOISE = 1e-9  # cm, m, degrees, radians or of a size: too small to be visible
+_NOISE = 1e-9  # cm, m, degrees, radians or scale: too small to see
 Floats = npt.NDArray[np.float32]
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "eval",
-        help="the pose that some control values give, or every frame of a clip",
+        help="evaluate a pose of control values, or every frame of a clip",
         usage="%(prog)s DNA [NAME=VALUE ...] [--lod N] [--gui] [--explain [--top N]] [--json]\n"
         "       %(prog)s CLIP DNA -o OUT.npz|OUT.csv [--lod N] [--rate R] [--frames A:B]\n"
         "                     [--what LIST] [--quaternions] [--compress] [--json]",
         description="One pose, without -o: prints every joint, blend shape channel and animated "
         "map that is not at rest. "
         "Joint values are deltas from neutral in the file's units and axes; scale 0 is no scale. "
-        "A value may lie outside 0..1: raw controls are not clamped, correctives clamp what they "
-        "multiply, GUI controls outside every interval of their table give nothing. "
-        "With -o, evaluates every frame of a clip (.rzc, CSV, JSON, any capture that is read) on a "
+        "A value may lie outside 0..1: raw controls are not clamped, correctives clamp their "
+        "factors, GUI controls outside every interval of their table have no effect. "
+        "With -o, evaluates every frame of a clip (.rzc, CSV, JSON, any supported capture) on a "
         "character and writes the animation; controls without a curve are at rest.",
     )
     parser.add_argument("file", type=Path, metavar="DNA or CLIP")
@@ -44,23 +44,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "controls",
         nargs="*",
         metavar="NAME=VALUE or DNA",
-        help="of one pose: the rest is at rest; a part of a name or an ARKit name will do if it "
-        "can mean one control (or its left and right) only",
+        help="control values of one pose; other controls are at rest; a part of a name or an ARKit "
+        "name is enough if it matches one control only (or its left and right)",
     )
     parser.add_argument(
         "--explain",
         action="store_true",
-        help="in words: which correctives, solvers and networks are at work, which joints move "
-        "most, and which control has which part in it",
+        help="explain the pose in words: active correctives, solvers and networks, the joints that "
+        "move most, and the share of each control",
     )
     parser.add_argument(
         "--top",
         type=whole_number(0, 1_000_000),
         default=10,
         metavar="N",
-        help="lines of each list of --explain (10)",
+        help="lines per list of --explain (10)",
     )
-    parser.add_argument("--gui", action="store_true", help="the names are of GUI controls")
+    parser.add_argument("--gui", action="store_true", help="the names are GUI controls")
     parser.add_argument(
         "--lod",
         type=whole_number(0, 65_535),
@@ -68,25 +68,25 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         metavar="N",
         help="0 is the finest (default)",
     )
-    parser.add_argument("--json", action="store_true", help="for a program")
+    parser.add_argument("--json", action="store_true", help="print JSON")
     eval_clip.add_options(parser)
     parser.set_defaults(func=run)
 
 
 def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
-    """Control values from NAME=VALUE texts; what a part of a name was taken for goes to stderr.
+    """Control values from NAME=VALUE texts; abbreviated names are reported on stderr.
 
     Args:
-        texts: as typed; a later one of the same name wins.
-        names: of all controls.
-        rest: float32[names], the values of the others.
+        texts: as typed; the last one of a name wins.
+        names: names of all controls.
+        rest: float32[names], values of controls that `texts` does not name.
 
     Returns:
         float32[names].
 
     Raises:
-        CommandLineError: a text of another form, a name that means no control or several, not a
-            finite number.
+        CommandLineError: a text has another form, a name matches no control or several, or a value
+            is not a finite number.
     """
     index = {name: i for i, name in enumerate(names)}
     values = rest.copy()
@@ -111,11 +111,12 @@ def parse_controls(texts: list[str], names: list[str], rest: Floats) -> Floats:
 
 
 def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
-    """float32[raw controls] of GUI controls; what the table does not write is at rest.
+    """Raw controls from GUI controls, float32[raw controls]; controls outside the table keep their
+    initial value.
 
     Args:
         dna: the face.
-        rig: compiled of it.
+        rig: the rig compiled from it.
         gui: float32[GUI controls].
     """
     raw = rig.gui_to_raw(gui)
@@ -126,12 +127,12 @@ def raw_of_gui(dna: risorius.Dna, rig: risorius.Rig, gui: Floats) -> Floats:
 
 
 def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, Any]]:
-    """Name, index and value of what is not 0.
+    """Name, index and value of each nonzero value.
 
     Args:
         values: float32[n].
-        names: of the values; where they run out, "control" and its number stand in.
-        first: the control number of the first value.
+        names: names of the values; a value beyond them is called "control" and its number.
+        first: control number of the first value.
     """
     return [
         {
@@ -144,18 +145,18 @@ def active(values: Floats, names: list[str], first: int = 0) -> list[dict[str, A
 
 
 def shortest(value: np.float32) -> float:
-    """The float with the fewest digits that is the same float32."""
+    """The shortest decimal that rounds to the same float32."""
     return float(np.format_float_scientific(value, unique=True))
 
 
 def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dict[str, Any]:
-    """Everything that the command prints, as plain values.
+    """All results of the command as plain values.
 
     Args:
         dna: the face.
-        rig: compiled of it.
+        rig: the rig compiled from it.
         raw: float32[raw controls].
-        lod: from 0.
+        lod: the LOD, from 0.
     """
     pose = rig.evaluate(raw, lod=lod)
     joints = [
@@ -177,11 +178,11 @@ def describe(dna: risorius.Dna, rig: risorius.Rig, raw: Floats, lod: int) -> dic
 
 
 def _moved(value: float) -> bool:
-    return not abs(value) < _NOISE  # NaN has to be seen
+    return not abs(value) < _NOISE  # show NaN too
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The facts for a person."""
+    """The results as text."""
     width = max(
         [len(row["name"]) for rows in facts.values() if isinstance(rows, list)
          for row in rows if isinstance(row, dict)],
@@ -197,7 +198,7 @@ def page(facts: dict[str, Any]) -> str:
         f"\njoints, as difference from the neutral pose ({facts['translation_unit']}, "
         f"{facts['rotation_unit']}; sx sy sz are added to 1)"
     )
-    # Rounding errors of float32 sums are no movement; --json has every digit.
+    # Rounding errors of float32 sums are not shown; --json has every digit.
     joints = [row for row in facts["joints"] if any(_moved(row[a]) for a in ATTRIBUTES)]
     if not joints:
         return "\n".join([*out, "  none"])
@@ -209,7 +210,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def check_options(args: argparse.Namespace) -> None:
-    """Raises: CommandLineError: an option of one way to use the command with the other."""
+    """Raises: CommandLineError: an option of poses was used with a clip, or the reverse."""
     if args.out is not None:
         for name, default in (("explain", False), ("gui", False), ("top", 10)):
             if getattr(args, name) != default:
@@ -228,7 +229,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def run_pose(args: argparse.Namespace) -> int:
-    """Raises: CommandLineError: what was typed does not fit the file."""
+    """Raises: CommandLineError: the arguments do not fit the file."""
     dna = risorius.load(args.file, layers="all")
     rig = risorius.Rig(dna)
     if not 0 <= args.lod < max(1, rig.lod_count):

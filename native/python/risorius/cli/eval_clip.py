@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius eval CLIP DNA -o OUT: the animation that a clip gives."""
+"""risorius eval CLIP DNA -o OUT: the animation of a face by a clip."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SUFFIXES = {".npz": "npz", ".csv": "csv"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """What CLIP DNA -o OUT takes beside --lod and --json."""
+    """Add the options of CLIP DNA -o OUT, except --lod and --json."""
     group = parser.add_argument_group("every frame of a clip: CLIP DNA -o OUT")
     group.add_argument(
         "-o",
@@ -34,24 +34,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT",
         help="OUT.npz: joints, blend_shapes, animated_maps, controls as float32[frames, ...] with "
-        "names, times in seconds and units, all numbers; OUT.csv: a row a frame, its time and the "
-        "numbers that are not at rest throughout",
+        "names, times in seconds and units; OUT.csv: a row per frame with its time and the "
+        "numbers that leave rest in some frame",
     )
     group.add_argument(
         "--mapping",
         metavar="NAME|FILE.toml",
-        help="how the clip's curves become raw controls; else the mapping that fits, for .rzc none",
+        help="mapping of the clip's curves to raw controls (default: the best fit; .rzc: none)",
     )
     group.add_argument("--rate", metavar="R", help="resample to R frames per second first")
     group.add_argument(
         "--frames",
         metavar="A:B",
-        help="frames A to B - 1 only, counted from 0 after --rate; A: and :B go to the ends",
+        help="only frames A to B - 1, counted from 0 after --rate; A: and :B go to the ends",
     )
     group.add_argument(
         "--what",
         metavar="LIST",
-        help=f"which of {','.join(PARTS)} to write ({','.join(DEFAULT_PARTS)})",
+        help=f"parts to write: {','.join(PARTS)} (default {','.join(DEFAULT_PARTS)})",
     )
     group.add_argument(
         "--quaternions", action="store_true", help="joint rotations as qx qy qz qw, not as angles"
@@ -74,7 +74,8 @@ def parse_frames(text: str) -> tuple[int | None, int | None]:
 
 
 def parse_parts(texts: list[str]) -> tuple[str, ...]:
-    """Parts in the order of PARTS. Raises: ValueError: an unknown one, one twice, none."""
+    """Parts in the order of PARTS. Raises: ValueError: a part is unknown or repeated, or there is
+    none."""
     for text in texts:
         if text not in PARTS:
             raise ArgumentError(f"some of {', '.join(PARTS)} were expected, found {text!r}")
@@ -98,7 +99,7 @@ def _option(name: str, parse: Any, text: str | None, default: Any) -> Any:
 
 
 def _target(args: argparse.Namespace) -> tuple[str, Path]:
-    """Kind and path of what is written."""
+    """Kind and path of the output."""
     kind = SUFFIXES.get(args.out.suffix.lower())
     if kind is None:
         raise CommandLineError(f"-o: a name ending in .npz or .csv was expected, found {args.out}")
@@ -115,7 +116,7 @@ def _target(args: argparse.Namespace) -> tuple[str, Path]:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The facts for a person, e.g. one line for a log."""
+    """The results as text, e.g. one line for a log."""
     move = f"{facts['largest_move']:.4g} {facts['translation_unit']}"
     joint = facts["largest_move_joint"]
     where = f" ({joint}, frame {facts['largest_move_frame']})" if joint else ""
@@ -127,7 +128,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def complaints(facts: dict[str, Any]) -> list[str]:
-    """What one should know of the clip on this character, in sentences."""
+    """Warnings about the clip on this character, in sentences."""
     out = []
     for key, kind, what in (
         ("unmapped_curves", "curve", "of the clip that is no control and not mapped"),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the commands that read .dna and .json alike have in common."""
+"""Tools shared by the commands that read .dna and .json files."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ KINDS = ("dna", "json")
 
 
 class InputError(RisoriusError):
-    """Input that cannot be used: one line that names the file and the place.
+    """Unusable input: one line with the file and the place.
 
-    offset: byte offset, where it is known and no DnaError is the cause.
+    offset: byte offset, if known and if no DnaError is the cause.
     """
 
     code = "input"
 
 
 class CommandLineError(RisoriusError):
-    """What was typed makes no sense."""
+    """The command line is invalid."""
 
     code = "command_line"
 
@@ -39,11 +39,11 @@ def whole_number(low: int, high: int = given.MOST) -> Callable[[str], int]:
     """The `type` of an option that takes a whole number.
 
     Args:
-        low: the least that is allowed.
-        high: the most that is allowed.
+        low: smallest value.
+        high: largest value.
 
     Raises:
-        ArgumentTypeError: the function that it gives, for anything else.
+        ArgumentTypeError: raised by the returned function for any other text.
     """
 
     def read(text: str) -> int:
@@ -61,12 +61,12 @@ def number(
     """The `type` of an option that takes a finite number.
 
     Args:
-        low: the least that is allowed.
-        high: the most that is allowed.
-        above: low itself is not allowed.
+        low: smallest value.
+        high: largest value.
+        above: exclude `low` itself.
 
     Raises:
-        ArgumentTypeError: the function that it gives, for anything else.
+        ArgumentTypeError: raised by the returned function for any other text.
     """
 
     def read(text: str) -> float:
@@ -82,7 +82,7 @@ def parse_lods(text: str) -> list[int]:
     """LOD numbers from a text such as "0", "0-2" or "0,3,5".
 
     Raises:
-        CommandLineError: a text of another form.
+        CommandLineError: the text has another form.
     """
     lods: set[int] = set()
     for part in text.split(","):
@@ -95,25 +95,25 @@ def parse_lods(text: str) -> list[int]:
 
 
 def label(name: str, standard: str = "<stdin>") -> str:
-    """A file's name as messages show it.
+    """A file's name for messages.
 
     Args:
         name: as the user typed it.
-        standard: stands for "-".
+        standard: the name to show for "-".
     """
     return standard if name == "-" else name
 
 
 def kind_of(name: str, asked: str | None, option: str) -> str:
-    """ "dna" or "json": as asked, else by the suffix.
+    """ "dna" or "json": the value of an option, else the suffix.
 
     Args:
-        name: of the file.
-        asked: what an option says; None: nothing.
-        option: what the error names beside a suffix.
+        name: name of the file.
+        asked: value of the option; None: not given.
+        option: option that the error message suggests.
 
     Raises:
-        CommandLineError: neither says it.
+        CommandLineError: neither is given.
     """
     suffix = Path(name).suffix.lower().removeprefix(".")
     if kind := asked or (suffix if suffix in KINDS else None):
@@ -122,36 +122,36 @@ def kind_of(name: str, asked: str | None, option: str) -> str:
 
 
 def refuse_same_file(source: str, target: str, advice: str = "choose another name") -> None:
-    """Refuse an output that is the input, by whatever path; "-" is no file.
+    """Refuse an output that is the same file as the input, by any path; "-" is not a file.
 
     Args:
         source: name of the input.
         target: name of the output.
-        advice: what mends it; an option only where the command has it.
+        advice: remedy for the message; name an option only if the command has it.
 
     Raises:
-        CommandLineError: they are one file.
+        CommandLineError: both are one file.
     """
     if "-" in (source, target):
         return
     try:
         same = os.path.samefile(source, target)
-    except OSError:  # one of them is not there
+    except OSError:  # one of them does not exist
         return
     if same:
         raise CommandLineError(f"{target}: the output is the input itself: {advice}")
 
 
 def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
-    """Refuse the name of an output that ends otherwise.
+    """Refuse an output name with another suffix.
 
     Args:
-        path: of the output.
-        kinds: suffixes with their dots.
-        option: that names the output.
+        path: path of the output.
+        kinds: allowed suffixes with their dots.
+        option: the option of the output.
 
     Raises:
-        CommandLineError: another suffix.
+        CommandLineError: the path has another suffix.
     """
     if path.suffix.lower() not in kinds:
         *most, last = kinds
@@ -162,14 +162,14 @@ def require_suffix(path: Path, kinds: Sequence[str], option: str) -> None:
 
 
 def require_writable(*names: str | Path | None, parents: bool = False) -> None:
-    """Before long work: what will be written has a place.
+    """Check before long work that the outputs can be written.
 
     Args:
-        names: of outputs; "-" and None need no place.
-        parents: folders that are not there will be made.
+        names: paths of outputs; "-" and None are skipped.
+        parents: missing folders will be created later.
 
     Raises:
-        InputError: no folder, or one that may not be written to.
+        InputError: a folder is missing or not writable.
     """
     for name in names:
         if name is None or str(name) == "-":
@@ -181,15 +181,15 @@ def require_writable(*names: str | Path | None, parents: bool = False) -> None:
 
 
 def read_bytes(name: str, most: int = FACE) -> bytes:
-    """A file's bytes, or those of the standard input for "-".
+    """Bytes of a file, or of the standard input for "-".
 
     Args:
         name: as the user typed it.
-        most: bytes that it may have.
+        most: largest size in bytes.
 
     Raises:
-        InputError: it cannot be read.
-        ReadingError: it is larger, or a device.
+        InputError: the file cannot be read.
+        ReadingError: the file is larger, or a device.
     """
     try:
         if name == "-":
@@ -200,10 +200,10 @@ def read_bytes(name: str, most: int = FACE) -> bytes:
 
 
 def from_json(name: str) -> risorius.Dna:
-    """A Dna from a file of JSON.
+    """Read a Dna from a JSON file.
 
     Raises:
-        InputError: not UTF-8, not JSON, not a Dna; with the place.
+        InputError: no UTF-8, no JSON or no Dna; with the place.
     """
     data = read_bytes(name)
     kind = signatures.kind_of(data)
@@ -221,21 +221,21 @@ def from_json(name: str) -> risorius.Dna:
 
 
 def read(name: str, kind: str) -> risorius.Dna:
-    """A whole Dna.
+    """Read a whole Dna.
 
     Args:
-        name: of the file; "-": the standard input.
+        name: name of the file; "-": the standard input.
         kind: "dna" or "json".
 
     Raises:
-        InputError: it cannot be used.
+        InputError: the file cannot be read.
     """
     if kind == "json":
         return from_json(name)
     try:
         return risorius.load(read_bytes(name) if name == "-" else name)
     except risorius.DnaError as error:
-        # load(path) has named the file already.
+        # load(path) already names the file
         raise InputError(f"{label(name)}: {error}" if name == "-" else str(error)) from error
 
 

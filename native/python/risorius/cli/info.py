@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius info: what is inside a DNA file, and what differs between two."""
+"""risorius info: the content of a DNA file, or the differences between two."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from .files import CommandLineError
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     info = subparsers.add_parser(
         "info",
-        help="what is inside a DNA file, or differs between two",
-        description="What is inside a file. With --diff, what differs between two (.dna or "
-        ".json), in words; the exit code is then that of diff: 0 the same, 1 different, 2 trouble.",
+        help="show the content of a DNA file, or the differences between two",
+        description="Shows the content of a file. With --diff, shows the differences of two files "
+        "(.dna or .json) in words; exit codes as in diff: 0 the same, 1 different, 2 trouble.",
     )
     info.add_argument("file", type=Path, nargs="?")
-    info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="what differs between two files")
+    info.add_argument("--diff", nargs=2, metavar=("A", "B"), help="differences between two files")
     info.add_argument("--all", action="store_true", help="with --diff: do not shorten lists")
     info.add_argument(
         "--mix-with",
         nargs="+",
         metavar="FACE",
-        help="which of these can be mixed with the file (risorius mix), and why others cannot; the "
-        "exit code is 1 where one cannot",
+        help="check which of these faces can be mixed with the file (risorius mix), and why others "
+        "cannot; the exit code is 1 if one cannot",
     )
-    info.add_argument("--json", action="store_true", help="for a program")
+    info.add_argument("--json", action="store_true", help="print JSON")
     info.set_defaults(func=run)
 
 
 def describe(dna: risorius.Dna) -> dict[str, Any]:
-    """Everything that the command prints, as plain values."""
+    """All results of the command as plain values."""
     lods = []
     for lod in range(dna.lod_count):
         rows = [int(g.lods[lod]) for g in dna.joint_groups if len(g.lods) > lod]
@@ -104,7 +104,7 @@ def _listed(mapping: risorius.LodMapping, lod: int) -> int:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """Rows of equal keys in columns, numbers to the right."""
+    """Rows with equal keys as columns of text, numbers aligned right."""
     if not rows:
         return "  none"
     heads = [key.replace("_", " ") for key in rows[0]]
@@ -122,7 +122,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 
 def page(facts: dict[str, Any]) -> str:
-    """The facts for a person."""
+    """The results as text."""
     signs = "".join("+" if s > 0 else "-" for s in facts["rotation_signs"])
     out = [
         f"{facts['name'] or '(no name)'}: DNA {facts['file_version']}, {facts['archetype']}, "
@@ -151,7 +151,7 @@ def page(facts: dict[str, Any]) -> str:
 
 
 def _mixes(first: str, others: list[str], *, as_json: bool) -> int:
-    """Says of each file whether it can be mixed with the first, else why not."""
+    """Print for each file whether it can be mixed with the first, or the reason."""
     face = risorius.load(first)
     found = {name: difference(face, risorius.load(name)) for name in others}
     if as_json:

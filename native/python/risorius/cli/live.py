@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius live: listen to a face-capture app, show what comes, record it."""
+"""risorius live: listen to a face-capture app, show its status, record it."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ _KINDS = (".rzc", ".csv")
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "live",
-        help="faces from a phone, as they come; recorded",
-        description="Listens for Live Link Face (ARKit mode) or for VMC and other OSC, shows on "
-        "one line what comes, and records a subject as curves of raw controls at the sender's own "
-        "times. Ctrl-C ends it and saves.",
+        help="show and record a face from a phone",
+        description="Listens for Live Link Face (ARKit mode) or for VMC and other OSC, shows the "
+        "status on one line, and records a subject as curves of raw controls at the sender's own "
+        "times. Ctrl-C stops and saves.",
     )
     parser.add_argument("--source", choices=SOURCES, default="livelink", help="default livelink")
     ports = ", ".join(f"{port} for {source}" for source, port in PORTS.items())
@@ -50,32 +50,35 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--everywhere",
         action="store_true",
-        help="listen to the network too, as a phone needs; else to this machine alone",
+        help="also listen to the network (needed for a phone); default: this machine only",
     )
     parser.add_argument(
         "--subject",
         default="",
         metavar="NAME",
-        help="as the app names it; it gets a place whoever else sends (default: the first heard)",
+        help="name of the subject in the app; it always gets a place (default: the first)",
     )
     parser.add_argument("--record", type=Path, metavar="OUT", help="clip.rzc or clip.csv")
     parser.add_argument(
-        "--seconds", type=number(0.0, above=True), metavar="N", help="end after them"
+        "--seconds", type=number(0.0, above=True), metavar="N", help="stop after N seconds"
     )
     parser.add_argument(
-        "--mapping", default="arkit", metavar="NAME|FILE", help="of names to controls, as TOML"
+        "--mapping",
+        default="arkit",
+        metavar="NAME|FILE",
+        help="mapping of names to controls, as TOML",
     )
     parser.add_argument(
-        "--range", type=Path, metavar="FILE", help="of the person, from risorius clip learn"
+        "--range", type=Path, metavar="FILE", help="the person's ranges, from risorius clip learn"
     )
     parser.add_argument(
-        "--gain", type=number(-1e6, 1e6), default=1.0, metavar="X", help="on all units"
+        "--gain", type=number(-1e6, 1e6), default=1.0, metavar="X", help="factor for all units"
     )
     parser.set_defaults(func=run)
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before anything is listened to."""
+    """Raises CommandLineError for wrong options, before the program listens."""
     if args.record is None:
         return
     require_suffix(args.record, _KINDS, "--record")
@@ -101,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _save(take: Take, shaper: Shaper, path: Path) -> None:
-    """Write what was recorded, and say what is not in it."""
+    """Write the take, and report left-out frames."""
     if not len(take):
         raise InputError(f"{path} was not written: no face came")
     if take.full:
@@ -120,7 +123,7 @@ def _save(take: Take, shaper: Shaper, path: Path) -> None:
 
 
 def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
-    """Show the status until the time is over, or somebody ends it."""
+    """Show the status until the time is over or the user stops it."""
     ended: list[int] = []
 
     def end(number: int, _frame: FrameType | None) -> None:
@@ -147,7 +150,7 @@ def _listen(receiver: Receiver, args: argparse.Namespace) -> None:
 
 
 def _place(receiver: Receiver) -> str:
-    """Who is heard, and where: what to type into the app."""
+    """Who can connect, and where: the address to type into the app."""
     if receiver.host == THIS_MACHINE:
         return f"this machine alone at port {receiver.port}; --everywhere for a phone"
     address = own_address() or "this machine's address"
@@ -155,7 +158,7 @@ def _place(receiver: Receiver) -> str:
 
 
 def words(status: Status) -> str:
-    """One line of what comes."""
+    """The status as one line."""
     if not status.subject:
         heard = "nothing heard yet" if not status.packets else "no face yet"
         refused = f", {status.refused} refused ({status.reasons[0][0]})" if status.refused else ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius clip learn: how far a person's controls go; and what takes it out of other clips."""
+"""risorius clip learn: learn a person's control ranges, and remove them from other clips."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ def add_learn(
     """Add the command.
 
     Args:
-        commands: of risorius clip.
-        add_input: gives the parser the arguments of a file of animation.
-        load: reads that file.
+        commands: subcommands of risorius clip.
+        add_input: adds the arguments of an animation file to the parser.
+        load: reads the animation file.
     """
     parser = commands.add_parser(
         "learn",
-        help="neutral and extremes of a person, from a capture",
-        description="Finds how far each control goes in a take in which the person goes from a "
-        "face at rest to all extremes, one after another. The file is text: look at it, edit it, "
-        "give it to clip convert and live as --range.",
+        help="learn the neutral face and the extremes of a person from a capture",
+        description="Finds the range of each control in a take of the person's neutral face and "
+        "of all extremes, one after another. The result is a text file: check it, edit it, and "
+        "pass it to clip convert and live with --range.",
     )
     add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="NAME.range.toml")
-    parser.add_argument("--mapping", metavar="M", help="as of clip convert")
+    parser.add_argument("--mapping", metavar="M", help="the same as in clip convert")
     parser.add_argument(
         "--performance",
         action="store_true",
-        help="the take shows acting: only peaks that stop at one height again and again, and "
+        help="the take shows acting: only peaks that repeatedly stop at the same height, and "
         "blinks, count as extremes",
     )
     parser.add_argument(
@@ -52,7 +52,7 @@ def add_learn(
         type=number(1.0, 4.0),
         default=MOST_GAIN,
         metavar="X",
-        help=f"controls that would need more are left as captured, 1 to 4 (default {MOST_GAIN:g}; "
+        help=f"controls that need a larger gain stay as captured, 1 to 4 (default {MOST_GAIN:g}; "
         "lids 2)",
     )
     parser.set_defaults(func=lambda args: _run(args, load))
@@ -73,15 +73,15 @@ def _run(args: argparse.Namespace, load: Callable[[argparse.Namespace], Imported
 
 
 def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
-    """A clip of raw controls with the ranges of its person taken out.
+    """A clip of raw controls with the person's ranges removed.
 
     Args:
-        clip: as mapped.
-        source: None for none, "self" for those of the clip, or a file of ranges.
-        report: gets a note.
+        clip: after the mapping.
+        source: None for no ranges, "self" for the ranges of the clip itself, or a file of ranges.
+        report: receives a note.
 
     Raises:
-        AnimationFileError: the file, or the clip for "self", cannot be used.
+        AnimationFileError: the file is unusable, or the clip is unusable with "self".
     """
     if source is None:
         return clip
@@ -96,14 +96,14 @@ def with_ranges(clip: Clip, source: str | None, report: Report) -> Clip:
 
 
 def _learn(clip: Clip, path: str | Path, **options: float) -> Ranges:
-    """`learn`, whose errors name the file."""
+    """`learn` with errors that name the file."""
     with _named(path):
         return learn(clip, **options)  # type: ignore[arg-type]
 
 
 @contextmanager
 def _named(path: str | Path) -> Iterator[None]:
-    """Let errors on a clip name the file that it is of."""
+    """Name the file in errors about its clip."""
     try:
         yield
     except ArgumentError as error:

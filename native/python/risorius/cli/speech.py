@@ -32,41 +32,47 @@ _KINDS = (".rzc", ".csv", ".json")
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "speech",
-        help="a voice as animation",
-        description="Moves a face to a voice: phonemes with their times, lips and jaw, blinks, "
-        "brows and nods. English. Much better with the text of what is said. "
+        help="animate a face from a voice",
+        description="Animates a face from a voice: phonemes with their times, lips and jaw, "
+        "blinks, brows and nods. English only. The spoken text improves the result a lot. "
         "Needs risorius[speech].",
     )
-    parser.add_argument("voice", type=Path, help="a WAV file, or what an ffmpeg on PATH can read")
+    parser.add_argument(
+        "voice", type=Path, help="a WAV file, or any file that an ffmpeg on PATH can read"
+    )
     parser.add_argument(
         "-o", "--out", type=Path, required=True, metavar="OUT", help="clip.rzc, .csv or .json"
     )
     known = parser.add_mutually_exclusive_group()
-    known.add_argument("--text", help="what is said")
-    known.add_argument("--transcript", metavar="FILE", help="a text file of what is said")
+    known.add_argument("--text", help="the spoken text")
+    known.add_argument("--transcript", metavar="FILE", help="file with the spoken text")
     known.add_argument(
         "--read",
         metavar="FILE",
-        help="phonemes with their times, as --phonemes or a forced aligner wrote them and somebody "
-        "corrected them; nothing is recognised",
+        help="phonemes with their times, written by --phonemes or a forced aligner and corrected "
+        "by hand; skips the recognition",
     )
     parser.add_argument(
         "--rate", type=number(1.0, 1000.0), default=60.0, metavar="FPS", help="(default 60)"
     )
     parser.add_argument(
-        "--intensity", type=number(0.0, 4.0), default=1.0, metavar="X", help="of the shapes, 0 to 4"
+        "--intensity",
+        type=number(0.0, 4.0),
+        default=1.0,
+        metavar="X",
+        help="strength of the mouth shapes, 0 to 4",
     )
     parser.add_argument(
-        "--seed", type=whole_number(0), default=0, metavar="N", help="of the blinks"
+        "--seed", type=whole_number(0), default=0, metavar="N", help="seed of the blinks"
     )
     parser.add_argument(
         "--expressions",
         type=Path,
         metavar="LIBRARY",
-        help="the face's own visemes, as author wrote them: a folder or a TOML file",
+        help="the face's own visemes, written by author: a folder or a TOML file",
     )
     parser.add_argument("--no-blinks", action="store_true")
-    parser.add_argument("--no-accents", action="store_true", help="brows and head keep still")
+    parser.add_argument("--no-accents", action="store_true", help="no motion of brows and head")
     parser.add_argument(
         "--phonemes",
         type=Path,
@@ -83,7 +89,8 @@ def complain(args: argparse.Namespace) -> None:
     require_writable(args.out, args.phonemes)
     if args.text is not None and Path(args.text).is_file():
         raise CommandLineError(
-            f"--text: what is said was expected, found the file {args.text}: --transcript reads it"
+            f"--text: the spoken text was expected, found the file "
+            f"{args.text}: --transcript reads it"
         )
     if args.phonemes is not None and args.phonemes.resolve() == args.out.resolve():
         raise CommandLineError("--phonemes: another file than that of -o was expected")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands print, as a terminal may have it: names in files are anybody's."""
+"""Safe terminal output: names in files may contain control characters."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any, TextIO, cast
 
-# Colours, moves of the cursor and titles begin with these; the others turn the order of letters.
+# Colours, cursor moves and titles begin with the first ones; the rest reverse the text direction.
 _ORDERS = [*range(32), *range(127, 160), 0x61C, 0x200E, 0x200F, *range(0x2028, 0x202F)]
 _ORDERS += range(0x2066, 0x206A)
 _SPELLED = {
@@ -19,19 +19,19 @@ _SPELLED = {
 
 
 def spelled(text: str) -> str:
-    """A text without anything that a terminal obeys: such letters are written as Python does.
+    """A text with its control characters written as Python escapes.
 
     Args:
-        text: with lines and tabs, which stay.
+        text: its tabs and line breaks stay.
     """
     return text.translate(_SPELLED)
 
 
 @contextlib.contextmanager
 def obeyed_by_nobody() -> Iterator[None]:
-    """Text that is printed until the context ends goes through `spelled`.
+    """Pass all text printed in this context through `spelled`.
 
-    Progress on the standard error begins with a carriage return, which stays there.
+    Progress on the standard error may begin with a carriage return.
     """
     out, error = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = _stream(out, ""), _stream(error, "\r")
@@ -46,7 +46,7 @@ def _stream(stream: TextIO, begin: str) -> TextIO:
 
 
 class _Spelling:
-    """A stream of text; everything but `write` is the stream's own."""
+    """A text stream; everything except `write` belongs to the original stream."""
 
     def __init__(self, stream: TextIO, begin: str) -> None:
         self._stream, self._begin = stream, begin

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ARKit units in terms of raw controls, and in the orders of others, read from arkit.toml."""
+"""The ARKit units as raw controls, and in the orders of protocols; read from arkit.toml."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 from ..base import toml
 
 FULL_SET = 10
-"""ARKit units from which on the expressions of VRM beside them are taken to repeat them."""
+"""With at least this many ARKit units, VRM expressions in the same file count as repetitions."""
 
 
 @cache
 def mapping() -> dict[str, dict[str, float]]:
-    """ARKit unit -> {raw control name as a DNA spells it: weight in [0, 1]}; 52 units."""
+    """ARKit unit -> {raw control in the spelling of a DNA: weight in [0, 1]}; 52 units."""
     table = _table()
     prefix = table["prefix"]
     return {
@@ -26,7 +26,8 @@ def mapping() -> dict[str, dict[str, float]]:
 
 @cache
 def shares() -> dict[str, str]:
-    """Raw control that takes back a share of another -> that other; see `shares.share_of`."""
+    """Raw control that takes back a share of another control -> that control; see
+    `shares.share_of`."""
     rows = mapping()
     return {
         control: next(iter(rows[whole]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls by the names that people type, and names for the controls that have none."""
+"""Finds controls by typed names, and names controls that have none."""
 
 from __future__ import annotations
 
@@ -14,39 +14,40 @@ from . import arkit, vocabulary
 
 
 class UnknownControlError(RisoriusError):
-    """No control, or more than one, goes by what was typed."""
+    """No control, or more than one, matches the typed text."""
 
     code = "unknown_control"
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a typed name was taken for: name of a control -> factor of the value."""
+    """The meaning of a typed name: control -> factor of the value."""
 
     controls: dict[str, float]
     is_exact: bool
 
 
 def last_part(name: str) -> str:
-    """jawOpen of CTRL_expressions.jawOpen; what follows in brackets stays whole."""
+    """jawOpen of CTRL_expressions.jawOpen; a bracketed suffix stays whole."""
     own, bracket, rest = name.partition(" (")
     return own.rpartition(".")[2] + bracket + rest
 
 
 def find_controls(text: str, names: Sequence[str]) -> Meaning:
-    """The controls that are meant by a name, or by a part of it.
+    """The controls that a typed name, or a part of a name, means.
 
-    In this order: the name itself; what follows its last point; an ARKit unit, if the file has its
-    controls; any part of a name, then of an ARKit unit, whatever its case; a name of another
-    program. Two names that differ in their side only (..L and ..R, ..Left and ..Right) are one
-    meaning. The first of these that gives anything decides, and only if it gives one meaning.
+    The candidates in this order: the name itself; the part behind its last dot; an ARKit unit, if
+    the file has its controls; any part of a name, then of an ARKit unit, regardless of case; a name
+    of another program. Two names that differ only in their side (..L and ..R, ..Left and ..Right)
+    are one meaning. The first kind of candidate with any match decides, and only if it has exactly
+    one meaning.
 
     Args:
-        text: as a person typed it.
-        names: of all controls.
+        text: typed by a user.
+        names: names of all controls.
 
     Raises:
-        UnknownControlError: nothing, or several meanings; the message lists them.
+        UnknownControlError: no meaning, or several; the message lists them.
     """
     if text in names:
         return Meaning({text: 1.0}, True)
@@ -64,7 +65,7 @@ def find_controls(text: str, names: Sequence[str]) -> Meaning:
 
 
 def _by_rank(text: str, names: Sequence[str]) -> Iterator[dict[str, dict[str, float]]]:
-    """Meanings by what each is called, the best kind of match first."""
+    """Meanings by name, the best kind of match first."""
     known = set(names)
     units = {u: row for u, row in arkit.mapping().items() if known.issuperset(row)}
     wanted = text.lower()
@@ -90,12 +91,12 @@ def _sides_as_one(
 
 
 def named(names: Sequence[str], index: int, kind: str) -> str:
-    """The name of an element, or e.g. "joint 7" where the file has none.
+    """The name of an element, or for example "joint 7" if the file has no name.
 
     Args:
-        names: of the file.
-        index: of the element; it may lie beyond the names.
-        kind: what the element is, e.g. "joint".
+        names: names in the file.
+        index: index of the element; it may lie beyond the names.
+        kind: kind of element, e.g. "joint".
     """
     return (names[index] if index < len(names) else "") or f"{kind} {index}"
 
@@ -125,7 +126,7 @@ class ControlNames:
         poses = dna.rbf_behavior_ext.pose_control_names
         if (
             not poses and not dna.rbf_behavior_ext.poses
-        ):  # 2.4: a pose writes the control of its name
+        ):  # 2.4: a pose writes the control of the same name
             poses = [p.name for p in dna.rbf_behavior.poses]
         shapes = _shapes_of_controls(dna)
         correctives = [
@@ -145,7 +146,7 @@ class ControlNames:
         return named(self.names, index, "control")
 
     def short(self, index: int) -> str:
-        """The part behind the last point where that says which one it is."""
+        """The part behind the last dot if it is unique."""
         return named(self._short, index, "control")
 
     def kind(self, index: int) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Face regions of controls, read from their names by the words of regions.toml."""
+"""Face regions of controls, derived from their names by regions.toml."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def region_of(control: str, *, by_last_part: bool = False) -> str:
 
     Args:
         control: its name.
-        by_last_part: look at short_name alone. Else what that does not tell, the part before it
-            may: head.yaw and eyeL.pitch have their region before the dot.
+        by_last_part: use only short_name. Otherwise the part before it decides if the last part
+            tells nothing: head.yaw and eyeL.pitch have their region before the dot.
     """
     words = [short_name(control)] if by_last_part else re.split(r"[.:|]", control)[::-1]
     for word in words:
@@ -48,14 +48,14 @@ def region_of(control: str, *, by_last_part: bool = False) -> str:
 
 
 def side_of(control: str) -> str:
-    """ "L" or "R" of a control with a side, else ""."""
+    """ "L" or "R" of a control with a side, otherwise ""."""
     end = short_name(control)
     return end[-1] if end[-1:] in ("L", "R") else ""
 
 
 def expand_sides(name: str) -> list[str]:
-    """`browDown*` gives both sides, `mouthFunnel**` the four quarters of the lips, others
-    themselves."""
+    """`browDown*` gives both sides, `mouthFunnel**` the four quarters of the lips, any other name
+    itself."""
     if name.endswith("**"):
         return [name[:-2] + quarter for quarter in ("UL", "UR", "DL", "DR")]
     if name.endswith("*"):
@@ -70,16 +70,16 @@ def mask(
 
     Args:
         names: the controls.
-        parts: weight in [0, 1] by region ("mouth"), region and side ("brow.L"), control
-            ("jawOpen", with its prefix or without) or pattern ("mouthCorner*"); a later one counts
-            where two name the same control.
+        parts: weight in [0, 1] by region ("mouth"), region and side ("brow.L"), control ("jawOpen",
+            with or without its prefix) or pattern ("mouthCorner*"); for the same control a later
+            entry wins.
         default: the weight of all others.
 
     Returns:
         float32[names].
 
     Raises:
-        ValueError: a weight out of range, or a part that names no control.
+        ValueError: a weight out of range, or a part that matches no control.
     """
     out = np.full(len(names), default, np.float32)
     for part, weight in parts.items():

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Controls that take back a share of another one: lips that stay together under an open jaw.
+"""Controls that take back a share of another control, such as lips that stay together on an open
+jaw.
 
-A capture says how far (mouthClose, as large as jawOpen where the lips are shut), a raw control
-says which share (mouthLipsTogether, 1 where they are shut): the one over the other.
+A capture has the amount (mouthClose, as large as jawOpen if the lips are shut); a raw control has
+the share (mouthLipsTogether, 1 if they are shut), which is the amount divided by jawOpen.
 """
 
 from __future__ import annotations
@@ -14,23 +15,23 @@ import numpy.typing as npt
 
 Numbers = TypeVar("Numbers", bound=npt.NDArray[np.floating[Any]])
 
-# Below this jaw the share falls to 0 with the part: a still face's noise over noise would jump
-# between 0 and 1. What it leaves open is a quarter of it at most, 0.2 mm between lips.
+# Below this jaw opening the share falls to 0 with the amount; otherwise the noise of a still face
+# would make it jump between 0 and 1. At most a quarter of LEAST is lost, 0.2 mm between the lips.
 LEAST = 0.02
 
 
 def share_of(part: Numbers, whole: Numbers) -> Numbers:
-    """The share of `whole` that `part` is, 0 to 1; 0 where both are 0.
+    """The share `part` / `whole`, 0 to 1; 0 if both are 0.
 
     Args:
         part: any shape.
-        whole: the same shape; what is below LEAST counts as LEAST.
+        whole: the same shape; values below LEAST count as LEAST.
     """
     return np.clip(part / np.maximum(whole, LEAST), 0.0, 1.0)
 
 
 def part_of(share: Numbers, whole: Numbers) -> Numbers:
-    """What share_of was given, where it was not cut off.
+    """The inverse of share_of, unless its result was clamped.
 
     Args:
         share: any shape.

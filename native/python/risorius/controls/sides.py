@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Left and right in the names of controls: whose partner each is."""
+"""Left and right in the names of controls: the partner of each."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def mirrored_name(name: str) -> str:
 
 
 def name_across(name: str) -> str:
-    """The same control of the other side: eyeLookLeftL and eyeLookLeftR look the same way.
+    """The same control on the other side: eyeLookLeftL and eyeLookLeftR look in the same direction.
 
-    A control of the whole face, as jawLeft, stays itself.
+    A control of the whole face, such as jawLeft, stays itself.
     """
     before, dot, last = name.rpartition(".")
     return before + dot + _on_the_other_side(last)

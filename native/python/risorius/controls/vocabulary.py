@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: MIT
-"""Which controls or which expression a name means, in which vocabulary.
+"""The meaning of a name: controls or an expression, in one of several vocabularies.
 
-One table for each vocabulary lies in vocabularies/, beside ARKit's units (arkit.toml); authoring,
-clips, live faces and typed names ask this module. A file has a title, a description, `strip`
-(beginnings that names may have), `begins` (those that they must have, the usual one first), `ends`
-(endings that they may have), `matching = "exact"` where letter case counts, `controls` (names that
-are raw controls), `same` (names of one meaning) and `names`. A name's meaning is
+Each vocabulary has a table in vocabularies/, next to ARKit's units (arkit.toml). Authoring, clips,
+live faces and typed names use this module. A file has a title, a description, `strip` (prefixes
+that names may have), `begins` (prefixes that they must have, the usual one first), `ends` (suffixes
+that they may have), `matching = "exact"` if letter case counts, `controls` (names that are raw
+controls), `same` (names with one meaning) and `names`. The meaning of a name is
 
-- a raw control without prefix, or a list of them: "*" stands for both sides, "**" for the four lip
-  quarters, and in a name for a side, L or Left, and then in its meaning as well;
+- a raw control without prefix, or a list of them. "*" stands for both sides and "**" for the four
+lip
+  quarters. In a name, "*" stands for a side, L or Left, which its meaning then has too;
 - "=jawOpen": an ARKit unit;
-- "@aa": an expression of the library, beside controls in a list where they may be taken already;
+- "@aa": an expression of the library; its controls in a list may belong to other names already;
 - a table of shares of controls or units: a shape of the whole face, with its expression's name;
-- []: nothing that a face's controls do.
+- []: nothing that controls of a face do.
 """
 
 from __future__ import annotations
@@ -33,22 +34,22 @@ PREFIX = "CTRL_expressions."
 ARKIT = "arkit"
 _ARKIT_STRIP = ("blendShapes.", "blendShape.", "ARKit_", "Face.", "FaceCap_")
 _SIDE = re.compile(r"(?:(?<=[a-z])(?=[LR]$)|(?<=[._\- ])(?=[LlRr]$))")
-_COPY = re.compile(r"\.\d{3}$")  # as Blender numbers what has another's name
+_COPY = re.compile(r"\.\d{3}$")  # the suffix that Blender gives to a repeated name
 _WORDS = {"L": "Left", "R": "Right"}
 
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name means.
+    """The meaning of a name.
 
     Attributes:
         vocabulary: its name, as of `names`.
-        name: as the vocabulary spells it.
-        controls: raw control as a DNA spells it -> weight; empty where the library's expression
-            says it, or nothing does.
-        expression: name of an expression, "" where it is none.
-        is_whole: a shape of the face or a part of it, which is an expression rather than a control.
-        units: ARKit unit -> weight, where the vocabulary says it in units.
+        name: in the vocabulary's spelling.
+        controls: raw control in the spelling of a DNA -> weight; empty if the meaning is an
+            expression of the library, or nothing.
+        expression: name of an expression; "" for none.
+        is_whole: a shape of the whole face or a part of it; it is an expression, not a control.
+        units: ARKit unit -> weight, if the vocabulary uses units.
     """
 
     vocabulary: str
@@ -61,7 +62,7 @@ class Meaning:
 
 @cache
 def loose_name(name: str) -> str:
-    """A name without letter case and separators, its side as |l or |r at the end.
+    """A name without letter case and separators, with its side as |l or |r at the end.
 
     eyeBlinkLeft, EyeBlinkLeft, eyeBlink_L, eyeBlinkL and eye_blink_left are one name.
     """
@@ -78,12 +79,12 @@ def loose_name(name: str) -> str:
 
 
 class Vocabulary:
-    """The names that one program or protocol has.
+    """The names that one program or protocol uses.
 
     Attributes:
-        name, title, description: for files, and for people.
-        meanings: name as it is usually spelled -> Meaning.
-        is_loose: letter case, "_" and Left or L at the end make no difference.
+        name, title, description: the key, and texts for people.
+        meanings: name in its usual spelling -> Meaning.
+        is_loose: ignore letter case, "_" and the difference of Left and L at the end.
     """
 
     def __init__(self, name: str, table: Mapping[str, Any]) -> None:
@@ -112,11 +113,11 @@ class Vocabulary:
                 yield _meaning(self.name, first + spelled, said)
 
     def spelled(self, name: str, *, loosely: bool = True) -> str | None:
-        """The name as the vocabulary spells it, or None.
+        """The name in the vocabulary's spelling, or None.
 
         Args:
-            name: with whatever stands before its last dot, its beginnings and its endings.
-            loosely: by its letters as well, where the vocabulary allows it.
+            name: may have anything before its last dot, and the vocabulary's prefixes and suffixes.
+            loosely: ignore the spelling if the vocabulary allows it.
         """
         for candidate in self._candidates(name):
             if candidate in self.meanings:
@@ -140,30 +141,30 @@ class Vocabulary:
 
 
 def parts_of(name: str) -> list[str]:
-    """A name as it is; without the number of a copy; what follows a mesh's or figure's name, which
-    ends at the last dot, colon or bar, or at the first double underscore."""
+    """The name itself; without the number of a copy; without the mesh's or figure's name before it,
+    which ends at the last dot, colon or bar, or at the first double underscore."""
     name = _COPY.sub("", name)
     after = re.split(r"[.:|]", name)[-1] if not name.startswith("CTRL_") else name
     return list(dict.fromkeys(p for p in (name, after, after.partition("__")[2]) if p))
 
 
 def names() -> tuple[str, ...]:
-    """Names of the vocabularies; ARKit first, which others share names with."""
+    """Names of the vocabularies; ARKit first, because other vocabularies share names with it."""
     return tuple(_all())
 
 
 def vocabulary(name: str) -> Vocabulary:
-    """One of them. Raises: KeyError: it is none of `names`."""
+    """One vocabulary. Raises: KeyError: not one of `names`."""
     return _all()[name]
 
 
 def find(name: str, order: Sequence[str] | None = None) -> Meaning | None:
-    """What a name means; None if no vocabulary knows it.
+    """The meaning of a name; None if no vocabulary knows it.
 
     Args:
-        name: of a shape or a curve, with whatever stands before its last dot.
-        order: of vocabularies, as `leading` gives it: the first that knows the name decides. None:
-            ARKit's in any spelling, then as a vocabulary spells it, then by its letters.
+        name: name of a shape or a curve; may have anything before its last dot.
+        order: vocabularies as returned by `leading`; the first that knows the name decides. None:
+            ARKit in any spelling, then the exact spelling of any vocabulary, then any spelling.
     """
     if order is not None:
         return _found(name, order, loosely=True)
@@ -183,15 +184,15 @@ def _found(name: str, order: Sequence[str], *, loosely: bool) -> Meaning | None:
 
 
 def known(given: Iterable[str]) -> dict[str, int]:
-    """How many of these names each vocabulary knows; those that know none are not in it."""
+    """The number of these names that each vocabulary knows, without those that know none."""
     given = list(given)
     counts = {v.name: sum(v.spelled(n) is not None for n in given) for v in _all().values()}
     return {name: count for name, count in counts.items() if count}
 
 
 def leading(given: Iterable[str]) -> tuple[str, ...]:
-    """The vocabularies in the order in which names that are together are looked up: the one that
-    knows most of them first, ARKit's before others that know as many."""
+    """The vocabularies in the order in which a set of names is looked up: the one that knows most
+    of them first; ARKit before others that know equally many."""
     counts = known(given)
     return tuple(sorted(counts, key=lambda name: -counts[name]))
 
@@ -210,11 +211,11 @@ def _all() -> dict[str, Vocabulary]:
 
 
 def _for_sides(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """A row as it is, or for each side where its name has a *."""
+    """A row unchanged, or one for each side if its name has a *."""
     if "*" not in name:
         yield name, value
         return
-    # eyeClosed* is spelled eyeClosedLeft, Eye_Blink_* is Eye_Blink_L, lipFunneler*B lipFunnelerLB
+    # eyeClosed* becomes eyeClosedLeft, Eye_Blink_* becomes Eye_Blink_L, lipFunneler*B lipFunnelerLB
     is_word = name[0].isupper() and "_" not in name and name.endswith("*")
     for side in "LR":
         yield name.replace("*", _WORDS[side] if is_word else side), _on_side(value, side)
@@ -247,7 +248,7 @@ def _meaning(vocabulary: str, name: str, value: Any) -> Meaning:
 
 
 def _controls_of(key: str, share: float, units: dict[str, float]) -> dict[str, float]:
-    """Controls of one part of a meaning; the units that it names are added to `units`."""
+    """Controls of one part of a meaning; its units are added to `units`."""
     if key.startswith("@"):
         return {}
     if not key.startswith("="):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables of control names and weights, as the TOML files of expressions and reactions have them."""
+"""Tables of control names and weights in the TOML files of expressions and reactions."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .regions import expand_sides
 def named_weights(
     table: Mapping[str, Any], prefix: str, where: str, lowest: float = 0.0, highest: float = 1.0
 ) -> dict[str, float]:
-    """{control: weight} with both sides of what ends in *; a name given in full counts more.
+    """{control: weight}; a name ending in * gives both sides, and a full name overrides a pattern.
 
     Args:
-        table: name -> weight, out of a TOML file.
-        prefix: stands before the name of each control in the result.
-        where: what errors call the table.
-        lowest, highest: what a weight may be.
+        table: name -> weight, from a TOML file.
+        prefix: put before each control in the result.
+        where: the table's name in errors.
+        lowest, highest: range of a weight.
 
     Raises:
-        ValueError: a weight that is no number in [lowest, highest].
+        ValueError: a weight that is not a number in [lowest, highest].
     """
     out: dict[str, float] = {}
     for name in sorted(table, key=lambda name: -name.count("*")):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Why a face looks as it does: what fires, what moves, and which control has which part in it.
+"""Explains a pose: which correctives fire, which joints move, and the share of each control.
 
-facts = explain(dna, rig, raw)     # plain values, as JSON has them
-print(page(facts))                 # in words
+facts = explain(dna, rig, raw)     # plain values that JSON can hold
+print(page(facts))                 # as text
 """
 
 from __future__ import annotations
@@ -45,18 +45,18 @@ def explain(
     lod: int = 0,
     gui: npt.ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Everything about one settled pose, as plain values.
+    """All facts about one settled pose, as plain values.
 
     Args:
-        dna: what rig was compiled from.
+        dna: the face from which rig was compiled.
         rig: with Euler angles.
         raw: float32[R], finite.
         lod: 0 is the finest.
-        gui: float32[G] that gave raw, if they did.
+        gui: float32[G] from which raw was computed, or None.
 
     Returns:
-        A dict that json.dumps takes. Every list begins with what matters most. Contributions of
-        joints add up to the joint's pose.
+        A dict that json.dumps accepts. Every list begins with its most important entry. The
+        contributions to a joint add up to its pose.
 
     Raises:
         ValueError: a rig with quaternions, controls or a pose that are not finite.
@@ -100,7 +100,7 @@ def explain(
 
 
 def _check_finite(dna: risorius.Dna, pose: risorius.Pose) -> None:
-    """Raises: ArgumentError: what is no number has no parts that add up to it."""
+    """Raises: ArgumentError: a pose that is not finite has no contributions that add up to it."""
     of = {
         "joint": (pose.joints, dna.joint_names),
         "blend shape channel": (pose.blend_shapes, dna.blend_shape_channel_names),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls that are on, correctives, networks, setups, channels and maps."""
+"""Active controls, correctives, networks, setups, channels and maps."""
 
 from __future__ import annotations
 
@@ -23,22 +23,22 @@ Facts = dict[str, Any]
 def table_hits(
     table: risorius.Conditionals, rows: int, inputs: Doubles
 ) -> dict[int, list[tuple[int, Facts]]]:
-    """The rows of a table of conditionals that count for some inputs.
+    """The rows of a conditional table that match some inputs.
 
     Args:
-        table: of the face.
-        rows: how many leading rows are used.
-        inputs: float64[n], values of what input_indices count.
+        table: table of the face.
+        rows: number of leading rows in use.
+        inputs: float64[n], by input index.
 
     Returns:
-        Output -> list of (input, its value, the interval and what the row gives).
+        Output -> list of (input, its value, the interval and the row's result).
     """
     out: dict[int, list[tuple[int, Facts]]] = {}
     matched = None
     for row in range(rows):
         pair = int(table.input_indices[row]), int(table.output_indices[row])
         if pair == matched:
-            continue  # within a run only the first row that holds counts
+            continue  # in a run only the first matching row counts
         matched = None
         low, high = sorted((float(table.from_values[row]), float(table.to_values[row])))
         value = float(inputs[pair[0]])
@@ -54,14 +54,14 @@ def table_hits(
 def explain_raw(
     dna: risorius.Dna, raw: Doubles, rest: Doubles, gui: Doubles | None, names: ControlNames
 ) -> list[Facts]:
-    """Raw controls that are not at rest, and the GUI controls that made them.
+    """Raw controls that do not rest, and the GUI controls that set them.
 
     Args:
         dna: the face.
         raw: float64[raw controls].
         rest: float64[raw controls], at rest.
-        gui: float64[GUI controls]; None: the raw controls were given themselves.
-        names: of the controls.
+        gui: float64[GUI controls]; None: the raw controls were set directly.
+        names: names of the controls.
     """
     hits: dict[int, list[tuple[int, Facts]]] = {}
     if gui is not None:
@@ -89,7 +89,7 @@ def explain_raw(
 
 
 def used_controls(dna: risorius.Dna, lod: int) -> set[int]:
-    """Controls that something reads at a LOD; correctives that nothing reads rest there.
+    """Controls that something reads at a LOD; unread correctives rest there.
 
     Args:
         dna: the face.
@@ -117,13 +117,13 @@ def _count(table: risorius.BlendShapeChannels | risorius.AnimatedMaps, lod: int)
 def explain_correctives(
     dna: risorius.Dna, controls: Doubles, lod: int, names: ControlNames
 ) -> Facts:
-    """Correctives that fire, those that lack one factor, and those that nothing reads.
+    """Correctives that fire, correctives that lack one factor, and unread ones.
 
     Args:
         dna: the face.
-        controls: float64[controls], of a pose.
+        controls: float64[controls] of a pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     rows = np.asarray(dna.psds.rows)
     used = used_controls(dna, lod)
@@ -137,7 +137,7 @@ def explain_correctives(
         if controls[output] != 0:
             fires.append(facts)
         elif not missing:
-            reason = "what it hangs on goes in a circle" if output in used else "nothing reads it"
+            reason = "it depends on itself" if output in used else "nothing reads it"
             unread.append(facts | {"reason": reason})
         elif len(missing) == 1 and len(set(columns)) > 1 and output in used:
             lacking.append(_near_miss(facts, missing[0], names))
@@ -189,9 +189,9 @@ def explain_networks(
 
     Args:
         dna: the face.
-        controls: float64[controls], of a pose.
+        controls: float64[controls] of a pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     ml = dna.machine_learned_behavior
     regions = _regions(dna)
@@ -245,12 +245,12 @@ def _on(indices: Sequence[int], controls: Doubles, names: ControlNames) -> list[
 
 
 def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) -> list[Facts]:
-    """Twists and swings that are not at rest: how far they turn, in degrees, and which joints.
+    """Twist and swing setups that do not rest: their angles in degrees, and their joints.
 
     Args:
         dna: the face.
-        controls: float64[controls], of a pose.
-        names: of the controls.
+        controls: float64[controls] of a pose.
+        names: names of the controls.
     """
     layer = dna.twist_swing_behavior
     out = []
@@ -283,7 +283,7 @@ def explain_setups(dna: risorius.Dna, controls: Doubles, names: ControlNames) ->
 
 
 def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
-    """Angles in degrees of the part about the axis and of what remains."""
+    """Angles in degrees of the twist about the axis and of the swing."""
     axis = min(axis, 2)
     about, w = float(q[axis]), float(q[3])
     rest = math.hypot(*(float(q[a]) for a in range(3) if a != axis))
@@ -301,14 +301,14 @@ def _twist_and_swing(q: Doubles, axis: int) -> tuple[float, float]:
 def explain_shapes(
     dna: risorius.Dna, values: Doubles, controls: Doubles, lod: int, names: ControlNames
 ) -> list[Facts]:
-    """Blend shape channels that are on and the control of each, the largest value first.
+    """Active blend shape channels and the control of each, the largest value first.
 
     Args:
         dna: the face.
-        values: float64[channels], of a pose.
-        controls: float64[controls], of the same pose.
+        values: float64[channels] of a pose.
+        controls: float64[controls] of the same pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     channels = dna.blend_shape_channels
     count = _count(channels, lod)
@@ -339,15 +339,15 @@ def explain_maps(
     lod: int,
     names: ControlNames,
 ) -> list[Facts]:
-    """Animated maps that are on, the one farthest from its value at rest first.
+    """Active animated maps, the one farthest from its value at rest first.
 
     Args:
         dna: the face.
-        values: float64[maps], of a pose.
+        values: float64[maps] of a pose.
         at_rest: float64[maps].
-        controls: float64[controls], of the same pose.
+        controls: float64[controls] of the same pose.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     table = dna.animated_maps.conditionals
     hits = table_hits(table, _count(dna.animated_maps, lod), controls)

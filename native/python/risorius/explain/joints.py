@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which joints move, and what part of it each control has."""
+"""The moving joints, and the contribution of each control."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from risorius import _native
 from ..controls.control_names import ControlNames, named
 from ..rigs.rotation import SEQUENCES, Convention, Doubles, angle_degrees, product
 
-# Key of a contribution: a control's index, or what moves a joint by several controls at once.
+# Key of a contribution: a control's index, or the name of a source that combines several controls.
 Key = int | str
 Contributions = dict[int, dict[Key, Doubles]]
 """joint -> key -> float64[9]: tx ty tz rx ry rz sx sy sz in the file's units."""
@@ -24,20 +24,20 @@ Contributions = dict[int, dict[Key, Doubles]]
 def contributions(
     dna: risorius.Dna, pose: risorius.Pose, lod: int, names: ControlNames
 ) -> Contributions:
-    """What each control adds to each joint; the sum of a joint's is its pose.
+    """The contribution of each control to each joint; they add up to the joint's pose.
 
-    Rows of joint groups add up control by control. Rotations that are products of quaternions do
-    not: a control's part is by how much the Euler angles change when its column is multiplied, in
-    the order in which they are. What a twist, a swing or a network's quaternion gives is one part.
+    Rows of joint groups are sums over controls. Products of quaternions are not: there a control's
+    contribution is the change of the Euler angles when its column is multiplied, in the order of
+    the columns. A twist, a swing or a network's quaternion is one contribution.
 
     Args:
         dna: the face.
-        pose: of its rig, with Euler angles.
+        pose: pose of its rig, with Euler angles.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
 
     Returns:
-        Joint -> what moves it -> float64[9], in the units of the file.
+        Joint -> source -> float64[9], in the units of the file.
     """
     controls = np.asarray(pose.controls, float)
     out = _linear(dna, controls, lod)
@@ -56,7 +56,7 @@ def contributions(
 
 
 def _replace_rotation(out: Contributions, joint: int, parts: dict[Key, Doubles]) -> None:
-    """The rotation of a joint comes from parts alone."""
+    """Replace the rotation of a joint by these parts."""
     mine = out.setdefault(joint, {})
     for v in mine.values():
         v[3:6] = 0
@@ -79,7 +79,7 @@ def _linear(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
         for row, output in enumerate(outputs):
             joint, attribute = divmod(output, 9)
             mine = out.setdefault(joint, {})
-            for v in mine.values():  # a group assigns: the last one that has the row
+            for v in mine.values():  # a group assigns rows: the last group wins
                 v[attribute] = 0
             for c in np.flatnonzero(parts[row]).tolist():
                 mine.setdefault(int(inputs[c]), np.zeros(9))[attribute] += parts[row, c]
@@ -87,7 +87,7 @@ def _linear(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _quaternions(dna: risorius.Dna, controls: Doubles, lod: int) -> dict[int, dict[Key, Doubles]]:
-    """Joints whose rotation the file declares to be a quaternion."""
+    """Contributions to joints whose rotation the file declares a quaternion."""
     kinds = dna.joint_behavior_metadata.joint_representations
     if len(kinds) == 0:
         return {}
@@ -111,7 +111,7 @@ def _product(
     rows: dict[int, int],
     controls: Doubles,
 ) -> dict[Key, Doubles]:
-    """Columns of one joint, one after the other in this order."""
+    """Contributions of one joint's columns, multiplied in this order."""
     total, before = np.array([0.0, 0.0, 0.0, 1.0]), np.zeros(3)
     out: dict[Key, Doubles] = {}
     for column in order.tolist():
@@ -132,7 +132,7 @@ def _product(
 
 
 def _setups(dna: risorius.Dna, names: ControlNames) -> Iterator[tuple[str, int]]:
-    """What each twist and swing is called, and a joint that it turns; twists come last."""
+    """The name of each twist and swing, and a joint that it turns; twists come last."""
     layer = dna.twist_swing_behavior
     for word, setups in (("swing", layer.swings), ("twist", layer.twists)):
         for setup in setups:
@@ -150,7 +150,7 @@ _BY_NETWORKS = "networks"
 
 
 def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
-    """Joints that networks move. Rotations that are converted, or quaternions, are one part."""
+    """Joints that networks move. A converted rotation or a quaternion is one contribution."""
     joints = dna.machine_learned_behavior_ext.joints
     settings = {
         int(k): int(v) for k, v in zip(joints.parameter_keys, joints.parameter_values, strict=True)
@@ -170,7 +170,7 @@ def _networks(dna: risorius.Dna, controls: Doubles, lod: int) -> Contributions:
 
 
 def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | None, Doubles]:
-    """The networks' system, if the file gives all of it, and the basis that leads to ours."""
+    """The networks' axes, if the file gives all of them, and the basis to the face's axes."""
     if not all(key in settings for key in range(3, 10)):
         return None, np.eye(3)
     signs = tuple(1 if settings[key] == 1 else -1 for key in (6, 7, 8))
@@ -181,12 +181,12 @@ def _system(dna: risorius.Dna, settings: dict[int, int]) -> tuple[Convention | N
 
 
 def _number(word: str) -> int:
-    """Of a direction; one that the format does not know is read as "#7"."""
+    """The number of a direction; one that the format does not define is read as "#7"."""
     return _WORDS.index(word) if word in _WORDS else int(word.removeprefix("#"))
 
 
 def _axis(number: int) -> Doubles:
-    """A direction; of numbers that the format does not know, the one that the evaluator takes."""
+    """The vector of a direction; for an undefined number, the evaluator's choice."""
     if number < len(_AXES):
         return _AXES[number]
     return np.eye(3)[number // 2 % 3]
@@ -237,18 +237,18 @@ def _moved(
 def explain_joints(
     dna: risorius.Dna, pose: risorius.Pose, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """Each joint that is not at rest, the one that moves most first.
+    """Each joint that does not rest, the one that moves most first.
 
-    A movement is measured as a length: translation, and a bone's length times the angle in radians
-    and the change of scale. The bone's length is the median of the file's. A control's share is the
-    part of its contribution that points along the whole; the shares of a joint add up to 1, and one
-    that works against the whole is negative.
+    Movement is measured as a length: translation, plus a bone's length times the angle in radians
+    and times the change of scale. The bone's length is the median of the file. A control's share is
+    the part of its contribution in the direction of the joint's whole movement; the shares of a
+    joint add up to 1, and a control that works against the movement has a negative share.
 
     Args:
         dna: the face.
-        pose: of its rig, with Euler angles.
+        pose: pose of its rig, with Euler angles.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     parts = contributions(dna, pose, lod, names)
     convention = Convention.of(dna)

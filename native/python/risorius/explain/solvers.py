@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""RBF solvers: how far each pose is and what it weighs."""
+"""RBF solvers: the distance and the weight of each pose."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ _METHODS = ("euclidean", "quaternion", "swing angle", "twist angle")
 def explain_solvers(
     dna: risorius.Dna, rig: risorius.Rig, controls: Doubles, lod: int, names: ControlNames
 ) -> list[dict[str, Any]]:
-    """The solvers of a LOD; of each the poses, those with the greatest weight first.
+    """The solvers of a LOD with their poses, the greatest weight first.
 
     Args:
         dna: the face.
-        rig: compiled of it.
+        rig: compiled from dna.
         controls: float64[controls], as evaluated.
         lod: from 0, the pose's.
-        names: of the controls.
+        names: names of the controls.
     """
     mapping = dna.rbf_behavior.lod_solver_mapping
     listed = mapping[lod].tolist() if lod < len(mapping) else []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The facts of explain() in sentences."""
+"""The facts of explain() as sentences."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _PARTS = 5  # controls that a joint's line names
 
 
 def page(facts: Facts, top: int = 10) -> str:
-    """The facts for a person.
+    """The facts as text.
 
     Args:
-        top: lines of each list; the rest is counted.
+        top: lines per list; the rest is counted.
     """
     sections = [
         _raw(facts, top),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Expressions: named poses on the standard raw controls, data files that one can edit and share.
+"""Expressions: named poses of the standard raw controls in data files that users can edit.
 
-The files beside this one hold six emotions, fifteen visemes and more; any file of their form can be
-loaded, and `text_of` writes one. A name that ends in * stands for both sides, in ** for the four
-lip quarters. A file may say the number of its form: `format = 1`.
+The files beside this one have six emotions, fifteen visemes and more. Any file of the same form can
+be loaded, and `text_of` writes one. A name ending in * stands for both sides, in ** for the four
+lip quarters. A file may state the version of its form: `format = 1`.
 """
 
 from __future__ import annotations
@@ -28,10 +28,11 @@ from ..controls.weights import named_weights
 
 FILES = ("emotions.toml", "visemes.toml", "faces.toml")
 EDITION = 2
-"""Of our own: what was saved by an earlier one is to look as it did, see `get`."""
+"""Version of Risorius' own expressions: a pose saved with an earlier one must keep its look, see
+`get`."""
 FORMAT = 1
-"""Of the files that text_of writes: a newer one is refused."""
-_SAVED = (-1.0, 1.5)  # the weights of a file that says its form: rotations, and overdrive
+"""Version of the form that text_of writes; a newer one is refused."""
+_SAVED = (-1.0, 1.5)  # weights of a file with a version: rotations, and overdrive
 VISEMES = ("sil", "PP", "FF", "TH", "DD", "kk", "CH", "SS", "nn", "RR", "aa", "E", "I", "O", "U")
 
 
@@ -42,32 +43,34 @@ class Expression:
     name: str
     label: str
     group: str
-    """ "emotion", "viseme" or what else a file says; pose libraries sort by it."""
+    """"emotion", "viseme" or another word of the file; pose libraries sort by it."""
     description: str
     weights: Mapping[str, float]
-    """By raw control as a DNA spells it, in [0, 1], of saved ones in [-1, 1.5]; others are 0."""
+    """By raw control in the spelling of a DNA, in [0, 1]; in saved files [-1, 1.5]. Others are
+    0."""
     regions: tuple[str, ...] = ()
-    """Those whose other controls it brings to rest; none: those of its weights."""
+    """Regions whose other controls the expression puts to rest; empty: the regions of its
+    weights."""
 
 
 class Lack(NamedTuple):
-    """What a rig lacks of one expression."""
+    """The part of one expression that a rig cannot show."""
 
     missing: tuple[str, ...]
-    """The controls that the rig does not have."""
+    """Controls that the rig lacks."""
     share: float
-    """What it can show: the sum of the weights that are there over the sum of all, in [0, 1]."""
+    """The share that it can show: the sum of its weights over the sum of all, in [0, 1]."""
 
 
 def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
     """Expressions by name.
 
     Args:
-        path: a TOML file, or a folder of such files, a library; without it those that come with
-            Risorius, in the order of FILES.
+        path: a TOML file, or a folder of such files (a library); None: Risorius' own, in the order
+            of FILES.
 
     Raises:
-        ValueError: the file, the expression, what was found and what was expected. OSError.
+        ValueError: with the file, the expression, the found and the expected value. OSError.
     """
     if path is None:
         return dict(_own(EDITION))
@@ -80,7 +83,7 @@ def load(path: str | os.PathLike[str] | None = None) -> dict[str, Expression]:
 
 
 def of_text(text: str) -> dict[str, Expression]:
-    """Expressions by name, of the text of a file.
+    """Expressions by name, from the text of a file.
 
     Raises:
         ValueError: as load.
@@ -89,14 +92,14 @@ def of_text(text: str) -> dict[str, Expression]:
 
 
 def get(name: str, edition: int = EDITION) -> Expression:
-    """One of Risorius' own.
+    """One of Risorius' own expressions.
 
     Args:
-        name: of the expression.
-        edition: 1 for those that were milder, else those of today.
+        name: name of the expression.
+        edition: 1 for the earlier, milder ones; otherwise the current ones.
 
     Raises:
-        ValueError: there is none of that name; some that there are.
+        ValueError: unknown name; the text lists some known ones.
     """
     own = _own(1 if edition == 1 else EDITION)
     if name not in own:
@@ -109,7 +112,7 @@ def get(name: str, edition: int = EDITION) -> Expression:
 def check(
     rig_names: Iterable[str], expressions: Mapping[str, Expression] | None = None
 ) -> dict[str, Lack]:
-    """What a rig lacks of expressions; those that it can show in full are not in it.
+    """The gaps of expressions on a rig; expressions that it can show in full are left out.
 
     Args:
         rig_names: Rig.raw_control_names.
@@ -126,17 +129,17 @@ def check(
 
 
 def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.NDArray[np.float32]:
-    """An expression as a rig takes it.
+    """An expression as raw controls of a rig.
 
     Args:
-        expression: a name of load(), or one of a file of yours.
+        expression: a name of load(), or an Expression.
         rig_names: Rig.raw_control_names.
 
     Returns:
-        float32[rig_names], 0 where the expression says nothing; what the rig lacks is left out.
+        float32[rig_names], 0 for other controls; controls that the rig lacks are left out.
 
     Raises:
-        ValueError: no expression of that name.
+        ValueError: unknown name.
     """
     if isinstance(expression, str):
         expression = get(expression)
@@ -145,7 +148,7 @@ def pose_vector(expression: str | Expression, rig_names: Sequence[str]) -> npt.N
 
 
 def text_of(expression: Expression) -> str:
-    """One expression as the TOML file that load reads, with the number of its form.
+    """One expression as a TOML file for load, with the version of its form.
 
     Raises:
         ValueError: a weight beyond [-1, 1.5], or a control whose name ends in *.
@@ -176,7 +179,7 @@ def text_of(expression: Expression) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A string as TOML has it, which escapes what JSON does and DEL as well."""
+    """A string in TOML, which escapes the same characters as JSON, and DEL."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
@@ -190,7 +193,7 @@ def _own(edition: int = EDITION) -> dict[str, Expression]:
 
 
 def _joined(found: Mapping[str, Mapping[str, Expression]]) -> dict[str, Expression]:
-    """The expressions of several files: of a name that two have, the later file's is taken."""
+    """The expressions of several files; of two with one name the later file's is taken."""
     out: dict[str, Expression] = {}
     file_of: dict[str, str] = {}
     for file, expressions in found.items():

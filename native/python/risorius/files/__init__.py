@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Files that are whole or not there, locks between processes, the folder of caches."""
+"""Atomic writing of files, locks between processes, the folder of caches."""

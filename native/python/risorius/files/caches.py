@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where this user's programs keep what can be made or fetched again."""
+"""The folder for files that can be made or downloaded again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from pathlib import Path
 
 
 def cache_folder() -> Path:
-    """Risorius' folder among the user's caches, as the platform has them; it need not be there."""
+    """Risorius' folder among the user's caches, by the platform's convention; it may not exist
+    yet."""
     if sys.platform == "win32":
         given = os.environ.get("LOCALAPPDATA", "")
         base = Path(given) if given else Path.home() / "AppData" / "Local"

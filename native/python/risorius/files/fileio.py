@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files that are whole or not there: the one way in which this package writes them."""
+"""Atomic writing: the only way in which this package writes files."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ _Path = str | os.PathLike[str]
 
 @contextlib.contextmanager
 def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
-    """A file to write that takes its name when it is whole, on the disk too.
+    """A file to write that gets its name when it is complete and on the disk.
 
-    An old file of the name stays until then, and for good after an exception. A link stays a link,
-    an old file's rights stay. Until it is whole the file has a hidden name of its own in the same
-    folder; what a killed process left of this kind goes when somebody writes there again. Devices
-    and pipes take the bytes as they come.
+    The old file stays until then, or for good after an exception. A link stays a link, and the old
+    file's rights stay. Until it is complete the file has a hidden name in the same folder. Hidden
+    files of killed processes are removed by the next write in that folder. Devices and pipes
+    receive the bytes directly.
 
     Args:
-        path: of a file in a folder that is there.
-        sweep: look for what killed processes left; not for each of thousands of files in a folder,
-            see sweep().
+        path: path of a file in an existing folder.
+        sweep: remove hidden files of killed processes; switch it off for thousands of files in one
+            folder and call sweep() once.
 
     Raises:
         OSError: it cannot be written; the error names path.
@@ -62,7 +62,7 @@ def replacing(path: _Path, *, sweep: bool = True) -> Iterator[IO[bytes]]:
 
 
 class _Named(io.FileIO):
-    """A file whose errors of writing name the file that the user knows."""
+    """A file whose write errors show the name that the user knows."""
 
     def __init__(self, file: _Path, mode: str, shown: str) -> None:
         super().__init__(file, mode)
@@ -76,10 +76,10 @@ class _Named(io.FileIO):
 
 
 def write_bytes(path: _Path, data: ReadableBuffer) -> None:
-    """Write a file as replacing() does.
+    """Write a file atomically, see replacing().
 
     Args:
-        path: of a file in a folder that is there.
+        path: path of a file in an existing folder.
         data: its bytes.
 
     Raises:
@@ -90,11 +90,11 @@ def write_bytes(path: _Path, data: ReadableBuffer) -> None:
 
 
 def write_text(path: _Path, text: str) -> None:
-    """Write a file as replacing() does.
+    """Write a text file atomically, see replacing().
 
     Args:
-        path: of a file in a folder that is there.
-        text: written as UTF-8, its lines ending as they do in it.
+        path: path of a file in an existing folder.
+        text: written as UTF-8 with unchanged line ends.
 
     Raises:
         OSError: it cannot be written; the error names path.
@@ -103,14 +103,14 @@ def write_text(path: _Path, text: str) -> None:
 
 
 def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
-    """Write several files that belong together: all have room before the first takes its name.
+    """Write several files that belong together: all are written before the first gets its name.
 
     Args:
-        files: path -> bytes; the first takes its name last. Folders that are not there are made,
-            and go again if the files cannot be written.
+        files: path -> bytes; the first file gets its name last. Missing folders are made, and
+            removed again if writing fails.
 
     Raises:
-        OSError: one cannot be written; then each is as it was.
+        OSError: one file cannot be written; then none is changed.
     """
     made: list[Path] = []
     try:
@@ -129,19 +129,18 @@ def write_all(files: Mapping[Path, ReadableBuffer]) -> None:
 
 @contextlib.contextmanager
 def staging(path: _Path) -> Iterator[Path]:
-    """A path of the same name in a hidden folder beside, for writers that are not ours.
+    """A path of the same name in a hidden folder beside the file, for external writers.
 
-    When the block ends, all that lies in that folder takes its place beside the file, with what
-    they are in, and the file last; each old one stays until then, and for good after an exception
-    or when the process is killed. The folder of a killed process goes when somebody writes there
-    again. Devices and pipes are given as they are.
+    When the block ends, all files in the hidden folder are moved to the folder of the file,
+    subfolders included, and the file itself last. Old files stay until then, or for good after an
+    exception or a kill. The hidden folder of a killed process is removed by the next write in that
+    folder. Devices and pipes are returned unchanged.
 
     Args:
-        path: of a file in a folder that is there.
+        path: path of a file in an existing folder.
 
     Raises:
-        OSError: nothing can be written there, or the block has written no file; the error names
-            path.
+        OSError: writing is impossible there, or the block wrote no file; the error names path.
     """
     target = Path(path)
     if os.path.exists(target) and not target.is_file() and not target.is_dir():
@@ -156,7 +155,7 @@ def staging(path: _Path) -> Iterator[Path]:
 
 
 def _take_places(folder: Path, target: Path) -> None:
-    """Move the files of a staging folder to where they are meant to be."""
+    """Move the files of a staging folder to their final places."""
     main = folder / target.name
     if not main.is_file():
         raise FileNotFoundError(errno.ENOENT, "nothing was written", os.fspath(target))
@@ -169,7 +168,7 @@ def _take_places(folder: Path, target: Path) -> None:
 
 
 def _made(folder: Path) -> list[Path]:
-    """Make a folder; which ones that took, the outermost first."""
+    """Make a folder; returns the folders that were made, the outermost first."""
     missing = [part for part in (folder, *folder.parents) if not part.exists()][::-1]
     for part in missing:
         part.mkdir(exist_ok=True)
@@ -177,13 +176,13 @@ def _made(folder: Path) -> list[Path]:
 
 
 def check_writable(path: _Path, *, parents: bool = False) -> None:
-    """Find out before long work whether replacing(path) would have a place to write.
+    """Check before long work whether replacing(path) will be possible.
 
     Args:
-        parents: folders that are not there will be made.
+        parents: missing folders will be made.
 
     Raises:
-        OSError: it would not; the error names path, and the reason.
+        OSError: it will not be possible; the error names path and the reason.
     """
     target = Path(path)
     if os.path.exists(target) and not target.is_file() and not target.is_dir():
@@ -193,7 +192,7 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
         while not os.path.lexists(missing.parent) and missing.parent != missing:
             missing = missing.parent
         if missing != target:
-            target = missing.with_name(f"{missing.name}-")  # a folder is to be there, not a file
+            target = missing.with_name(f"{missing.name}-")  # this will become a folder, not a file
     try:
         FileReplacement(os.fspath(target), False).discard()
     except OSError as error:
@@ -201,6 +200,6 @@ def check_writable(path: _Path, *, parents: bool = False) -> None:
 
 
 def sweep(folders: Iterable[Path]) -> None:
-    """Delete what processes of this machine that have ended left in folders."""
+    """Delete hidden files that ended processes of this machine left in folders."""
     for folder in folders:
         remove_leftovers(folder)

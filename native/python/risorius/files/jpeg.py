@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""JPEG files: baseline, grey or colour, with codes made for the picture. For what goes over a
-network: a PNG of a painted face is five times as large."""
+"""Baseline JPEG files, grey or colour, with Huffman codes made for the picture.
+
+They are for files sent over a network: a PNG of a painted face is five times as large.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,8 @@ Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint8]
 
-_LONGEST = 16  # bits of a code
-_RUN, _END = 0xF0, 0x00  # symbols: sixteen zeros, and nothing more in this block
+_LONGEST = 16  # longest code in bits
+_RUN, _END = 0xF0, 0x00  # symbols: sixteen zeros, and the end of the block
 # The tables of the standard's annex K for quality 50, in rows.
 _LUMA = np.array(
     """16 11 10 16 24 40 51 61 12 12 14 19 26 58 60 55 14 13 16 24 40 57 69 56 14 17 22 29 51 87
@@ -50,8 +52,8 @@ def jpeg(pixels: Pixels, quality: int = 85, *, fine_color: bool = False) -> byte
     Args:
         pixels: uint8[h, w] or [h, w, 3], sides from 1 to 65535; row 0 is the bottom (v = 0), as of
             files.png.
-        quality: 1 to 100, as other programs count it.
-        fine_color: keep the colour of each pixel, as normal maps need; else one of four is kept.
+        quality: 1 to 100, as in other programs.
+        fine_color: keep the colour of each pixel, as normal maps need; otherwise of one in four.
     """
     height, width = pixels.shape[:2]
     image = pixels[::-1].astype(np.float64)
@@ -97,7 +99,7 @@ def _padded(plane: Floats, step: int) -> Floats:
 
 
 def _blocks(plane: Floats, side: int, table: Pixels) -> Ints:
-    """int[units, side * side, 64]: whole frequencies in the order in which they are written."""
+    """int[units, side * side, 64]: quantised frequencies in the order of the file."""
     rows, columns = (size // (8 * side) for size in plane.shape)
     cut = plane.reshape(rows, side, 8, columns, side, 8).transpose(0, 3, 1, 4, 2, 5)
     waves = _COSINES @ cut @ _COSINES.T
@@ -128,11 +130,11 @@ def _coded(units: list[Ints]) -> tuple[bytes, list[tuple[int, bytes]]]:
 
 
 def _tokens(blocks: Ints, order: Ints, colour: int) -> tuple[Ints, ...]:
-    """Key (place in the scan), table, symbol, and the bits behind its code, of each token.
+    """Key (place in the scan), table, symbol, and the extra bits of each token.
 
     Args:
         blocks: int[n, 64].
-        order: of the blocks in the scan.
+        order: order of the blocks in the scan.
         colour: 0 for brightness, 1 for colour: tables 2 * colour and 2 * colour + 1.
     """
     steady = np.diff(blocks[:, 0], prepend=0)
@@ -172,8 +174,8 @@ def _extra(values: Ints, sizes: Ints) -> Ints:
 
 
 def _code(counts: Ints) -> tuple[Ints, Ints, bytes]:
-    """Lengths and codes by symbol, and the table as a file has it."""
-    # One more symbol takes the code of ones alone, which files may not use.
+    """Lengths and codes by symbol, and the table in the form of the file."""
+    # An extra symbol gets the code of all ones, which the standard reserves.
     heap = [(int(n), i, [i]) for i, n in enumerate(counts) if n] + [(0, 256, [256])]
     long = np.zeros(257, np.int64)
     heapq.heapify(heap)
@@ -182,7 +184,7 @@ def _code(counts: Ints) -> tuple[Ints, Ints, bytes]:
         long[a[2] + b[2]] += 1
         heapq.heappush(heap, (a[0] + b[0], min(a[1], b[1]), a[2] + b[2]))
     amounts = np.bincount(long[long > 0], minlength=_LONGEST + 1)
-    for length in range(len(amounts) - 1, _LONGEST, -1):  # as the standard's figure K.3 shortens
+    for length in range(len(amounts) - 1, _LONGEST, -1):  # as in figure K.3 of the standard
         while amounts[length] > 0:
             shorter = length - 2
             while amounts[shorter] == 0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A folder in which one process works at a time."""
+"""A lock on a folder, so that only one process works in it."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from pathlib import Path
 from ..base.errors import RisoriusError
 
 NAME = ".risorius.lock"
-_GOING = 1.0  # seconds in which others let go of a file that was removed
+_GOING = 1.0  # seconds after which other processes have closed a removed file
 _UNKNOWN = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL)
 
 
 class LockedError(RisoriusError):
-    """Another process works in the folder; the text says which."""
+    """Another process works in the folder; the text names it."""
 
     code = "locked"
 
 
 @contextlib.contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Work alone in a folder that is there.
+    """Work alone in an existing folder.
 
-    The lock is the system's and ends with the process that has it, however that ends. A file
-    `.risorius.lock` says who has it meanwhile.
+    The lock belongs to the system and ends with its process in any case. A file `.risorius.lock`
+    names the holder meanwhile.
 
     Raises:
-        LockedError: another process works there; says which, where and since when.
+        LockedError: another process works there; the text says which, where and since when.
         OSError: the folder cannot be written; the error names it.
     """
     handle = _open(folder)
@@ -43,7 +43,7 @@ def locked(folder: Path) -> Iterator[None]:
         os.write(handle, _about_this_process())
         yield
     finally:
-        # A process that waits for the lock by its name opens another file; see _open.
+        # A process that waits for the lock opens another file of that name; see _open.
         if sys.platform != "win32":
             _remove(folder)
         os.close(handle)
@@ -57,20 +57,20 @@ def _remove(folder: Path) -> None:
 
 
 def _open(folder: Path) -> int:
-    """A descriptor of the folder's lock, which this process has now."""
+    """A descriptor of the folder's lock, held by this process."""
     path, last = folder / NAME, time.monotonic() + _GOING
     while True:
         try:
             handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
         except OSError as error:
-            # Windows refuses the name of a file that was removed until nobody has it open.
+            # Windows refuses the name of a removed file until no process has it open.
             if sys.platform == "win32" and error.errno == errno.EACCES and time.monotonic() < last:
                 time.sleep(0.01)
                 continue
             raise OSError(error.errno, error.strerror, str(folder)) from None
         try:
             _take(handle, folder)
-            # The last holder may have removed the file between our opening and our locking it.
+            # The last holder may have removed the file between open and lock.
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), os.stat(path)):
                     return handle
@@ -83,7 +83,7 @@ def _open(folder: Path) -> int:
 if sys.platform == "win32":
     import msvcrt
 
-    _FAR = 1 << 30  # Windows hides locked bytes from readers, and the holder's name is to be read
+    _FAR = 1 << 30  # Windows hides locked bytes, and the holder's name must stay readable
 
     def _take(handle: int, folder: Path) -> None:
         os.lseek(handle, _FAR, os.SEEK_SET)
@@ -104,7 +104,7 @@ else:
         except OSError as error:
             if error.errno not in _UNKNOWN:
                 raise
-            # A file system without locks: the holder's number in the file decides.
+            # A file system without locks: the process number in the file decides.
             holder = _holder(handle)
             if _may_live(holder):
                 raise LockedError(_refusal(folder, holder)) from None
@@ -129,7 +129,7 @@ def _about_this_process() -> bytes:
 
 
 def _holder(handle: int) -> dict[str, object]:
-    """What the file says of who has it; nothing where it says nothing yet."""
+    """The holder according to the file; empty if the file is still empty."""
     os.lseek(handle, 0, os.SEEK_SET)
     try:
         found = json.loads(os.read(handle, 4096))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Names of files made from names that somebody else wrote: the one way in which they become paths.
+"""File names made from names in other files: the only way in which such names become paths.
 
-The name of an expression, a character, an image or a clip is any text. As the name of a file it
-must lead into no other folder, open no device and be possible on Windows, macOS and Linux alike.
+The name of an expression, a character, an image or a clip may be any text. As a file name it must
+not lead to another folder, must not open a device, and must be valid on Windows, macOS and Linux.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import unicodedata
 from collections.abc import Iterable
 
-LONGEST = 200  # bytes of UTF-8; file systems take 255, and others put something of their own behind
+LONGEST = 200  # bytes of UTF-8; file systems allow 255, and other code appends suffixes
 UNNAMED = "unnamed"
 _FORBIDDEN = frozenset('<>:"/\\|?*')
 _DEVICES = frozenset(
@@ -20,20 +20,20 @@ _DEVICES = frozenset(
 
 
 def file_name(name: str, ending: str = "", taken: Iterable[str] = ()) -> str:
-    """The name of a file for something that has a name, safe on every system.
+    """A file name for a named object, safe on every system.
 
-    A name that is safe already stays as it is. In others separators, drives, wildcards and what
-    cannot be printed become "_"; dots and spaces at the begin and the end go; the name of a device
-    gets "_" before it; a long one is cut inside no character.
+    A safe name stays unchanged. Otherwise separators, drives, wildcards and unprintable characters
+    become "_"; dots and spaces at both ends are removed; "_" is put before the name of a device; a
+    long name is cut between characters.
 
     Args:
-        name: any text, also an empty one.
-        ending: what the file's name ends in, with its dot; from the program, never from data.
-        taken: names of files that it must not be, whatever their case and however their accents are
-            spelled; then it gets a number.
+        name: any text, even empty.
+        ending: suffix with its dot; from the program, never from data.
+        taken: file names to avoid, regardless of case and of the spelling of accents; a number is
+            appended if needed.
 
     Returns:
-        A name without a folder, of at most LONGEST bytes.
+        A name without a folder, at most LONGEST bytes.
     """
     text = "".join("_" if c in _FORBIDDEN or not c.isprintable() else c for c in name)
     text = text.lstrip(" .")
@@ -46,7 +46,7 @@ def file_name(name: str, ending: str = "", taken: Iterable[str] = ()) -> str:
 
 
 def is_file_name(name: str) -> bool:
-    """Whether a name from a file may be used as the name of a file beside it.
+    """Whether a name from a file is safe as a file name in the same folder.
 
     Args:
         name: any text.
@@ -55,18 +55,18 @@ def is_file_name(name: str) -> bool:
 
 
 def folded(path: str) -> str:
-    """What two paths share that are one file on some system.
+    """A key that is equal for two paths that name one file on some system.
 
     Args:
-        path: or the name of a file; names that differ in case alone, or in how an accent is
-            spelled, are one on some systems.
+        path: a path or a file name. On some systems names that differ only in case, or in the
+            spelling of an accent, name one file.
     """
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", path).casefold())
 
 
 def _cut(text: str, ending: str) -> str:
-    """A text and an ending, the text shortened until both have room."""
-    room = LONGEST - len(ending.encode()) - 1  # for the "_" before a device
+    """A text and an ending, with the text shortened to fit."""
+    room = LONGEST - len(ending.encode()) - 1  # one byte for the "_" before a device
     text = text.encode()[:room].decode(errors="ignore").rstrip(" .") or UNNAMED
     device = text.partition(".")[0].rstrip().casefold() in _DEVICES
     return f"{'_' * device}{text}{ending}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""PNG files as this package writes them: 8 bits, grey or colour, rows as they are or predicted."""
+"""PNG files as this package writes them: 8 bits, grey or colour, rows plain or filtered."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.uint8]
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _MOST_TEXELS = 1 << 26
-_BAND = 1 << 22  # values that are predicted at once
+_BAND = 1 << 22  # values that are filtered at once
 
 
 def png(image: Floats) -> bytes:
     """An 8-bit PNG of float [h, w], [h, w, 3] or [h, w, 4] in [0, 1]; row 0 is the bottom (v = 0).
 
-    The fourth value is the opacity, which the colour is not multiplied with.
+    The fourth value is the opacity; the colour is not premultiplied.
     """
     return pixels_to_png(np.clip(np.rint(image * 255), 0, 255).astype(np.uint8))
 
 
 def pixels_to_png(image: Pixels) -> bytes:
-    """As png, of uint8 from 0 to 255."""
+    """Like png, for uint8 from 0 to 255."""
     height, width = image.shape[:2]
     values = 1 if image.ndim == 2 else image.shape[2]
     kind = {1: 0, 3: 2, 4: 6}[values]
@@ -38,7 +38,7 @@ def pixels_to_png(image: Pixels) -> bytes:
     packer, body = zlib.compressobj(6), []
     band = max(1, _BAND // max(1, width * values))
     for begin in range(0, height, band):
-        first = max(0, begin - 1)  # the row above is what a row may be predicted from
+        first = max(0, begin - 1)  # the filter of a row may need the row above
         predicted = _predicted(rows[first : begin + band], values)[begin - first :]
         body.append(packer.compress(predicted.tobytes()))
     body.append(packer.flush())
@@ -48,12 +48,12 @@ def pixels_to_png(image: Pixels) -> bytes:
 
 
 def _predicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8]:
-    """uint8[h, 1 + w]: each row as it is, less its left neighbours or less the row below, whichever
-    is nearest to nothing and so packs best; before it the number that says which.
+    """uint8[h, 1 + w]: each row unfiltered, minus its left neighbours, or minus the row above,
+    whichever has the smallest values and so packs best; the filter's number comes first.
 
     Args:
         rows: uint8[h, w], the uppermost first.
-        values: of a pixel.
+        values: number of values per pixel.
     """
     left, above = rows.copy(), rows.copy()
     left[:, values:] -= rows[:, :-values]
@@ -66,19 +66,19 @@ def _predicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uint8
 
 
 def has_opacity(data: bytes) -> bool:
-    """Whether a file is a PNG of 8 bits whose pixels have an opacity, as those of hair have.
+    """Whether a file is an 8-bit PNG with opacity, as hair textures have.
 
     Args:
-        data: of the file.
+        data: the bytes of the file.
     """
     return _header(data)[2:] in ((8, 6), (8, 4))
 
 
 def read_png(data: bytes) -> Floats | None:
-    """An image without opacity that png wrote, or None: another kind of file, or damaged.
+    """An image without opacity that png wrote; None for another kind of file or a damaged one.
 
     Args:
-        data: of the file.
+        data: the bytes of the file.
 
     Returns:
         float64[h, w] or [h, w, 3] in [0, 1]; row 0 is the bottom.
@@ -88,11 +88,11 @@ def read_png(data: bytes) -> Floats | None:
 
 
 def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
-    """As read_png, uint8 from 0 to 255.
+    """Like read_png, as uint8 from 0 to 255.
 
     Args:
-        data: of the file.
-        opacity: read [h, w, 4] too, whose fourth value is the opacity.
+        data: the bytes of the file.
+        opacity: also accept [h, w, 4], whose fourth value is the opacity.
     """
     shape = pixels_of(data, opacity=opacity)
     if shape is None:
@@ -100,7 +100,7 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
     height, width, values = shape
     body = _body(data, height * (1 + width * values))
     rows = np.frombuffer(body, np.uint8).reshape(height, -1) if body else None
-    if rows is None or rows[:, 0].max(initial=0) > 2:  # another program's, which predicts more
+    if rows is None or rows[:, 0].max(initial=0) > 2:  # another program's file with other filters
         return None
     pixels = _unpredicted(rows, values)
     pixels = pixels.reshape((height, width, values) if values > 1 else (height, width))
@@ -108,12 +108,12 @@ def read_pixels(data: bytes, *, opacity: bool = False) -> Pixels | None:
 
 
 def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | None:
-    """Height, width and values of a pixel that a file says it holds; None: read_png does not
-    read such a file.
+    """Height, width and values per pixel that a file declares; None if read_png cannot read the
+    file.
 
     Args:
-        data: of the file.
-        opacity: as of read_pixels.
+        data: the bytes of the file.
+        opacity: as in read_pixels.
     """
     width, height, depth, kind = _header(data)
     values = ({0: 1, 2: 3, 6: 4} if opacity else {0: 1, 2: 3}).get(kind, 0)
@@ -123,7 +123,7 @@ def pixels_of(data: bytes, *, opacity: bool = False) -> tuple[int, int, int] | N
 
 
 def _header(data: bytes) -> tuple[int, int, int, int]:
-    """Width, height, bits of a value and kind of a PNG; zeros for what is none."""
+    """Width, height, bits per value and kind of a PNG; zeros for other files."""
     if data[:8] != _SIGNATURE or len(data) < 33 or data[12:16] != b"IHDR":
         return 0, 0, 0, 0
     width, height, depth, kind = struct.unpack(">IIBB", data[16:26])
@@ -142,7 +142,7 @@ def _unpredicted(rows: npt.NDArray[np.uint8], values: int) -> npt.NDArray[np.uin
 
 
 def _body(data: bytes, size: int) -> bytearray:
-    """The rows, unpacked; none where they are not of this size."""
+    """The unpacked rows; empty if they do not have this size."""
     unpacked, out = zlib.decompressobj(), bytearray()
     try:
         for kind, part in _chunks(data):

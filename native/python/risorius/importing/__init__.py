@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Animation of other software as clips of raw controls.
+"""Imports animation of other software as clips of raw controls.
 
 file --read--> Imported (the file's own curves) --apply(mapping)--> Clip of raw controls, Report
 """

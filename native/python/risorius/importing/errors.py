@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The error of files of animation."""
+"""The error class of animation files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..base.errors import RisoriusError
 
 
 class AnimationFileError(RisoriusError):
-    """A file of animation, or a mapping, that cannot be used; the sentence names file and place."""
+    """An animation file or a mapping that cannot be used; the sentence names file and place."""
 
     code = "animation_file"
 
@@ -22,8 +22,8 @@ class AnimationFileError(RisoriusError):
         column: int | str | None = None,
         unknown: Sequence[str] = (),
     ) -> None:
-        """Args: the file; one clause; line from 1; column from 1, or its header; curves that no
-        mapping knows, where that is the error."""
+        """Args: name of the file; message, one clause; line from 1; column from 1, or its header;
+        unknown: curves that no mapping knows, if that is the error."""
         self.name = name
         self.unknown = tuple(unknown)
         self.line = line

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Binary FBX: animated properties, blend shape channels, and the sliders of a face board."""
+"""Reads binary FBX: animated properties, blend shape channels, and sliders of a face board."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"Kaydara FBX Binary  \x00\x1a\x00"
-# Units of a key's time in a second; FBX 8000 counts in larger ones.
+# Ticks per second of key times; FBX 8000 has larger ticks.
 TICKS = 46186158000
 TICKS_8000 = 141120000
-# GlobalSettings.TimeMode -> frames a second.
+# GlobalSettings.TimeMode -> frames per second.
 TIME_MODES = {
     0: 30.0, 1: 120.0, 2: 100.0, 3: 60.0, 4: 50.0, 5: 48.0, 6: 30.0, 7: 30.0, 8: 30000 / 1001,
     9: 30000 / 1001, 10: 25.0, 11: 24.0, 12: 1000.0, 13: 24000 / 1001, 15: 96.0, 16: 72.0,
     17: 60000 / 1001, 18: 120000 / 1001,
 }  # fmt: skip
 _TOP = {"GlobalSettings", "Objects", "Connections"}
-# Nodes that are skipped unread: they are most of a file's bytes.
+# Nodes that are skipped unread, because they are most of a file.
 _BULK = frozenset(("Geometry", "Video", "Texture", "Material", "Pose", "Implementation"))
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
-# Bytes of memory that a record, one of its values and a key of a curve take, rounded up.
+# Bytes of memory per record, per value of a record and per key of a curve, rounded up.
 _NODE_BYTES, _VALUE_BYTES, _KEY_BYTES = 300, 48, 120
 # KeyAttrFlags.
 _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
@@ -45,7 +45,7 @@ _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x50
 
 @dataclass(slots=True)
 class Packed:
-    """An array as it stands in the file; unfolded when somebody asks."""
+    """An array in the file, which is unpacked on demand."""
 
     parser: Parser
     dtype: np.dtype[Any]
@@ -55,7 +55,7 @@ class Packed:
     size: int
 
     def unfold(self) -> npt.NDArray[Any]:
-        """Raises: AnimationFileError: other bytes. BudgetError: more than the file may take."""
+        """Raises: AnimationFileError: damaged bytes. BudgetError: more than the file may take."""
         wanted = self.count * self.dtype.itemsize
         data = memoryview(self.parser.data)[self.at : self.at + self.size]
         if self.is_packed:
@@ -75,7 +75,7 @@ class Packed:
 
 @dataclass(slots=True)
 class Node:
-    """A record: name, values, records inside."""
+    """A record: name, values, nested records."""
 
     name: str
     values: list[Any]
@@ -85,13 +85,13 @@ class Node:
         return next((node for node in self.inner if node.name == name), None)
 
     def array(self, name: str) -> npt.NDArray[Any]:
-        """The array that a record inside holds, unfolded; empty without it."""
+        """The array in a nested record, unpacked; empty if there is none."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.unfold() if isinstance(value, Packed) else np.zeros(0)
 
     def length(self, name: str) -> int:
-        """How many numbers the array has, as the file says before it is unfolded."""
+        """The length of the array according to the file, before it is unpacked."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.count if isinstance(value, Packed) else 0
@@ -102,19 +102,19 @@ def is_fbx(data: bytes) -> bool:
 
 
 def is_text_fbx(text: str) -> bool:
-    """The form that people can read, which no one should exchange animation in."""
+    """Whether a file is text FBX, which is not suitable for exchanging animation."""
     head = text[:2000]
     return "FBXHeaderExtension:" in head or head.lstrip().startswith("; FBX")
 
 
 class Parser:
-    """The records of a file.
+    """Parses the records of a file.
 
     Args:
         data: the whole file.
-        name: what errors call it.
-        budget: bounds memory and work.
-        skipped: objects of these kinds are known by name alone.
+        name: the file's name in errors.
+        budget: limits memory and work.
+        skipped: kinds of objects whose records are not read.
     """
 
     def __init__(
@@ -137,7 +137,7 @@ class Parser:
 
         Args:
             at: offset in the file, bytes.
-            message: what was expected and what was found.
+            message: the expected and the found value.
         """
         return AnimationFileError(self.name, f"byte {at}: {message}")
 
@@ -205,14 +205,14 @@ class Parser:
 
 @dataclass
 class Scene:
-    """What of a file says how things move.
+    """The parts of a file that describe motion.
 
     Attributes:
         settings: GlobalSettings, or None.
         objects: id -> record.
         parents: id -> (parent's id, property or ""), in the file's order.
-        budget: of the file.
-        notes: what is to be said of the reading.
+        budget: budget of the file.
+        notes: sentences about the reading.
     """
 
     name: str
@@ -225,14 +225,14 @@ class Scene:
     _keys: dict[int, Keys] = field(default_factory=dict)
 
     def keys(self, curve: int) -> Keys:
-        """Of an AnimationCurve, unfolded when it is first asked for."""
+        """The keys of an AnimationCurve, unpacked on first use."""
         if curve not in self._keys:
             self._keys[curve] = _keys(self, self.objects[curve], self.notes)
         return self._keys[curve]
 
     @cached_property
     def children(self) -> dict[int, list[int]]:
-        """The other way round, in the order of objects in `parents`; each child once."""
+        """Parent -> children, in the order of objects in `parents`; each child once."""
         out: dict[int, list[int]] = {}
         for child, links in self.parents.items():
             self.budget.work(len(links), "connections")
@@ -247,19 +247,20 @@ class Scene:
 def read(data: bytes, name: str, take: str | None = None, budget: Budget | None = None) -> Take:
     """The curves of an animation stack.
 
-    A blend shape channel's curve has its name, its percent as a fraction. A property's curve has
-    the property's name, on whatever node it stands: so a rig's curves are written. A node whose
-    name begins with CTRL_ is a slider of a face board: its place gives CTRL_C_jaw.tx, .ty, .tz.
+    The curve of a blend shape channel has the channel's name, with its percentage as a fraction.
+    The curve of a property has the property's name, on any node, because curves of rigs are written
+    so. A node whose name begins with CTRL_ is a slider of a face board: its location gives
+    CTRL_C_jaw.tx, .ty, .tz.
 
     Args:
         data: the whole file.
-        name: what errors call the file.
-        take: name or number of a stack; None: the first that moves any of that.
-        budget: bounds memory and work; None: by the size of the file.
+        name: the file's name in errors.
+        take: name or number of a stack; None: the first that animates any of these.
+        budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: no FBX that can be read, no such stack, nothing of that animated.
-        BudgetError: the file unfolds to far more than its size.
+        AnimationFileError: not a readable FBX, no such stack, or none of these is animated.
+        BudgetError: the file unpacks to far more than its size.
     """
     scene = read_scene(Parser(data, name, budget or Budget.of(len(data))))
     stacks, components = scene.of_kind("AnimationStack"), _components(scene)
@@ -283,11 +284,11 @@ def read(data: bytes, name: str, take: str | None = None, budget: Budget | None 
 
 
 def read_scene(parser: Parser) -> Scene:
-    """The objects of a file and what hangs on what.
+    """The objects of a file and their connections.
 
     Raises:
-        AnimationFileError: the file is damaged; with the place in it.
-        BudgetError: more than a file of its size may hold.
+        AnimationFileError: a damaged file; with the place.
+        BudgetError: more than a file of its size may need.
     """
     top = parser.top()
     objects = {
@@ -306,14 +307,14 @@ def read_scene(parser: Parser) -> Scene:
 
 
 def properties(node: Node | None) -> dict[str, list[Any]]:
-    """Name -> values of what an object, or the scene, says of itself; not what it leaves out."""
+    """Name -> values of the properties that an object, or the scene, states explicitly."""
     table = node.first("Properties70") if node is not None else None
     rows = [p for p in (table.inner if table else []) if len(p.values) > 4]
     return {str(p.values[0]): p.values[4:] for p in rows}
 
 
 def _rate(scene: Scene) -> float:
-    """Frames a second that the scene is made for."""
+    """Frames per second of the scene."""
     rows = {name: values[-1] for name, values in properties(scene.settings).items()}
     custom = rows.get("CustomFrameRate")
     if rows.get("TimeMode") == 14 and isinstance(custom, int | float) and 0 < custom < 1e4:
@@ -323,7 +324,7 @@ def _rate(scene: Scene) -> float:
 
 
 def object_name(node: Node) -> str:
-    """Of an object, without its class and without a namespace."""
+    """The name of an object without its class and namespace."""
     text = str(node.values[1]) if len(node.values) > 1 else ""
     return text.partition("\0")[0].rpartition(":")[2]
 
@@ -340,7 +341,7 @@ def _chosen(scene: Scene, stacks: dict[int, Node], take: str | None) -> Sequence
 def _curves(
     scene: Scene, stack: int, components: dict[int, list[tuple[str, int]]], channels: set[str]
 ) -> dict[str, Keys]:
-    """Name -> keys of everything that a stack moves; 0 for what belongs to no stack."""
+    """Name -> keys of everything that a stack animates; 0 for curves without a stack."""
     out: dict[str, Keys] = {}
     bones = 0
     for identity, parts in components.items():
@@ -351,7 +352,7 @@ def _curves(
             continue
         for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
-                continue  # the percent of a blend shape once more, for other software
+                continue  # repeats the percentage of a blend shape, for other software
             scene.budget.work(len(parts), "connections")
             named = _named(scene, owner, way, parts)
             bones += not named
@@ -381,7 +382,7 @@ def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
 
 
 def _owners(scene: Scene, links: Sequence[tuple[int, str]]) -> list[tuple[Node, str]]:
-    """Objects and the properties of theirs that something is connected to."""
+    """Objects, and the properties of theirs to which something is connected."""
     return [(scene.objects[i], way) for i, way in links if way and i in scene.objects]
 
 
@@ -392,7 +393,7 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
 def _named(
     scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
 ) -> list[tuple[str, Keys]]:
-    """(curve's name, keys) of a property of an object; none of a bone's place and the like."""
+    """(curve's name, keys) of a property; empty for the location of a bone and the like."""
     name = object_name(owner)
     if way == "DeformPercent":
         return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
@@ -418,7 +419,7 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
     """Keys of an AnimationCurve.
 
     Raises:
-        AnimationFileError: times and values that do not fit, times that do not ascend.
+        AnimationFileError: numbers of times and values differ, or times do not ascend.
     """
     ticks = node.array("KeyTime")
     scene.budget.hold(ticks.size * _KEY_BYTES, f"{ticks.size} keys")
@@ -448,12 +449,13 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 
 
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
-    """Flags of each key, slopes after it and before the next; the file has a set for each run."""
+    """Flags of each key, and the slopes after it and before the next; the file stores runs of
+    keys."""
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
     good = 0 < flags.size <= count and flags.size == runs.size
-    # No run may be longer than the curve: the sum of the runs would overflow.
+    # No run may be longer than the curve, because the sum of the runs would overflow.
     if not good or (runs < 0).any() or (runs > count).any() or runs.sum() != count:
         return np.full(count, 4, np.int64), np.zeros((count, 2))
     table = np.zeros((flags.size, 4))
@@ -465,7 +467,7 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
 def _auto(
     times: Doubles, values: Doubles, flags: npt.NDArray[np.int64], leave: Doubles, arrive: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Slopes of keys whose tangents are automatic: along their neighbours, flat at an extreme."""
+    """Slopes of keys with automatic tangents: parallel to their neighbours, flat at an extreme."""
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():
         return leave, arrive

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""glTF and GLB: animated morph target weights, and properties animated through pointers."""
+"""Reads glTF and GLB: animated morph target weights, and properties animated by pointers."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ from .source import Take, keep_ascending, make_clip, read_bytes
 Doubles = npt.NDArray[np.float64]
 
 MAGIC = b"glTF"
-# Frames a second of curves that bend between their keys.
+# Frames per second for sampling smooth curves.
 RATE = 60.0
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 FLOATS = (5126,)
 COORDINATES = (5120, 5121, 5122, 5123, 5126)
-"""Component types of positions, their changes and texture coordinates, also of quantized ones."""
+"""Component types of positions, their deltas and texture coordinates, including quantised ones."""
 INDICES = (5121, 5123, 5125)
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _KINDS = {"STEP": CONSTANT, "LINEAR": LINEAR, "CUBICSPLINE": CUBIC}
 
 
 class Document:
-    """A glTF document and its buffers, each read when it is asked for."""
+    """A glTF document and its buffers, which are read on demand."""
 
     def __init__(
         self, path: Path, json: Mapping[str, Any], binary: bytes | None, budget: Budget
@@ -56,8 +56,8 @@ class Document:
         """An AnimationFileError that names the file and the place in its JSON, e.g. "accessors[3]".
 
         Args:
-            place: where in the JSON.
-            message: what was expected and what was found.
+            place: in the JSON.
+            message: the expected and the found value.
         """
         return AnimationFileError(self.name, f"{place}: {message}")
 
@@ -66,11 +66,11 @@ class Document:
 
         Args:
             kind: a list at the top of the JSON, e.g. "accessors".
-            index: position in it, as the file gives it; it may be of any type.
-            place: what errors name: where the index stands.
+            index: position in it, as in the file; may be of any type.
+            place: place of the index, for errors.
 
         Raises:
-            AnimationFileError: no index, nothing there, or no table there.
+            AnimationFileError: not an index, or no table at that index.
         """
         rows = self.json.get(kind)
         if not isinstance(rows, list) or isinstance(index, bool) or not isinstance(index, int):
@@ -80,16 +80,16 @@ class Document:
         return rows[index]
 
     def whole(self, table: Mapping[str, Any], key: str, place: str, default: int = 0) -> int:
-        """A whole number of 0 or more out of a table of the JSON.
+        """A whole number of 0 or more from a table of the JSON.
 
         Args:
-            table: where it stands.
-            key: what it is called there.
-            place: what errors call the table.
-            default: the number where the table has no such key.
+            table: the table.
+            key: the key of the number.
+            place: the table's name in errors.
+            default: the number if the key is missing.
 
         Raises:
-            AnimationFileError: something else is there.
+            AnimationFileError: another value.
         """
         value = table.get(key, default)
         try:
@@ -98,17 +98,17 @@ class Document:
             raise self.fail(f"{place}.{key}", str(error)) from None
 
     def numbers(self, index: object, place: str) -> Doubles:
-        """float64[count] of a scalar accessor; whole numbers as the fractions they stand for.
+        """float64[count] of a scalar accessor; normalised integers become fractions.
 
-        Who asks again gets the same array: a thousand channels may share one.
+        Repeated calls return the same array, because a thousand channels may share one.
 
         Args:
-            index: of the accessor, as the file gives it.
-            place: what errors name: where the index stands.
+            index: index of the accessor, as in the file.
+            place: place of the index, for errors.
 
         Raises:
-            AnimationFileError: no such accessor, one of a kind that is not read, one that reaches
-                beyond its buffer, numbers that are not finite.
+            AnimationFileError: no such accessor, an unsupported kind, an accessor beyond its
+                buffer, numbers that are not finite.
             BudgetError: more numbers than a file of this size may hold.
         """
         if isinstance(index, int) and not isinstance(index, bool) and index in self._numbers:
@@ -141,18 +141,18 @@ class Document:
     ) -> Doubles:
         """float64[count, n] of an accessor of meshes: n is 1, 2, 3, 4 or 16 by its kind.
 
-        Strided, sparse, quantized and packed ones too. Whole numbers stay what they are, unless the
-        file says that they are fractions.
+        Supports strided, sparse, quantised and packed accessors. Integers stay integers unless the
+        file declares them normalised.
 
         Args:
-            index: of the accessor, as the file gives it.
-            place: what errors name: where the index stands.
+            index: index of the accessor, as in the file.
+            place: place of the index, for errors.
             kind: "SCALAR", "VEC2", "VEC3", "VEC4" or "MAT4".
-            components: component types that are allowed there.
+            components: allowed component types.
 
         Raises:
-            AnimationFileError: no such accessor, one of another kind, one that reaches beyond its
-                buffer, damaged bytes, numbers that are not finite.
+            AnimationFileError: no such accessor, another kind, an accessor beyond its buffer,
+                damaged bytes, numbers that are not finite.
             BudgetError: more numbers than a file of this size may hold.
         """
         accessor = self.item("accessors", index, place)
@@ -185,7 +185,7 @@ class Document:
     def _put_sparse(
         self, sparse: Mapping[str, Any], at: str, dtype: np.dtype[Any], out: Doubles
     ) -> None:
-        """The rows that a sparse accessor names, in place."""
+        """Write the rows of a sparse accessor into `out`."""
         count = self.whole(sparse, "count", at)
         parts = [sparse.get("indices"), sparse.get("values")]
         if not all(isinstance(part, dict) for part in parts):
@@ -203,7 +203,7 @@ class Document:
     def _viewed(
         self, table: Mapping[str, Any], at: str, dtype: np.dtype[Any], shape: tuple[int, int]
     ) -> npt.NDArray[Any]:
-        """Numbers [shape] where a table's bufferView and byteOffset say, with the view's stride."""
+        """Numbers [shape] at a table's bufferView and byteOffset, with the view's stride."""
         number = table.get("bufferView")
         view = self.item("bufferViews", number, at)
         view_at = f"bufferViews[{number}]"
@@ -225,7 +225,8 @@ class Document:
         return np.ndarray(shape, dtype, data, start + inside, (stride, dtype.itemsize))
 
     def _part(self, index: object, place: str) -> tuple[bytes, int, int]:
-        """Bytes, and where in them and how long a buffer view is; unpacked where it is packed."""
+        """The bytes that contain a buffer view, its offset and its length; unpacked if it is
+        packed."""
         view = self.item("bufferViews", index, place)
         view_at = f"bufferViews[{index}]"
         number = int(index)  # type: ignore[call-overload]  # item says it is one
@@ -244,7 +245,7 @@ class Document:
         return out, 0, len(out)
 
     def _stored(self, table: Mapping[str, Any], place: str) -> tuple[bytes, int, int]:
-        """The buffer that a table names, and its byteOffset and byteLength in it."""
+        """The buffer of a table, and its byteOffset and byteLength."""
         data = self._buffer(table.get("buffer"), place)
         start, size = (self.whole(table, key, place) for key in ("byteOffset", "byteLength"))
         if start + size > len(data):
@@ -259,8 +260,8 @@ class Document:
         """The bytes of a buffer view, such as a picture.
 
         Args:
-            index: of the buffer view, as the file gives it.
-            place: what errors name: where the index stands.
+            index: index of the buffer view, as in the file.
+            place: place of the index, for errors.
 
         Raises:
             AnimationFileError: no such view, or one that reaches beyond its buffer.
@@ -271,14 +272,14 @@ class Document:
         return data[start : start + size]
 
     def draco(self, table: Mapping[str, Any], place: str) -> draco.DracoMesh:
-        """The mesh that Draco packed.
+        """The mesh that a Draco extension holds.
 
         Args:
-            table: of the primitive's extension.
-            place: what errors name: where it stands.
+            table: the primitive's extension.
+            place: its name in errors.
 
         Raises:
-            AnimationFileError: no such bytes, no mesh of Draco, or DracoPy is not installed.
+            AnimationFileError: no such bytes, not a Draco mesh, or DracoPy is not installed.
         """
         packed = self.view_bytes(table.get("bufferView"), place)
         try:
@@ -307,17 +308,17 @@ class Document:
             except (binascii.Error, ValueError) as error:
                 raise self.fail(place, f"base64 was expected: {error}") from error
         file = unquote(uri)
-        # A glTF may name files in its own folder, and no others on the disk.
+        # A glTF may refer to files in its own folder, but to no others on the disk.
         if re.match(r"[a-zA-Z]+:|[/\\]", file) or ".." in re.split(r"[/\\]", file):
             raise self.fail(place, f"a file beside this one was expected, found {uri[:80]!r}")
         data = read_bytes(self.path.parent / file, found=True)
-        # A buffer in a file of its own counts as input; but a short JSON may name that file often.
+        # A buffer in its own file counts as input, but a short JSON may refer to it many times.
         self.budget.hold(len(data), place)
         return data
 
 
 def _is_key(value: object, table: Mapping[Any, object]) -> TypeGuard[Any]:
-    """Whether a value of the JSON, which may be a list, stands in a table."""
+    """Whether a value of the JSON, which may be a list, is a key of a table."""
     return isinstance(value, int | str) and value in table
 
 
@@ -329,12 +330,12 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
     """A GLB, the binary form of glTF.
 
     Args:
-        path: of the file; its buffers are looked for beside it, and errors name it.
+        path: path of the file; its buffers are in the same folder, and errors name it.
         data: the whole file.
-        budget: bounds memory and work; None: by the size of the file.
+        budget: limits memory and work; None: by the size of the file.
 
     Raises:
-        AnimationFileError: no GLB of version 2, or a cut one; with the byte.
+        AnimationFileError: not a GLB of version 2, or cut short; with the byte.
     """
     budget = budget or Budget.of(len(data))
     name = str(path)
@@ -370,7 +371,7 @@ def open_glb(path: Path, data: bytes, budget: Budget | None = None) -> Document:
 
 
 def is_gltf(document: object) -> bool:
-    """JSON with the version that every glTF has to have."""
+    """Whether a JSON has the version that every glTF must have."""
     return (
         isinstance(document, dict)
         and isinstance(document.get("asset"), dict)
@@ -381,16 +382,16 @@ def is_gltf(document: object) -> bool:
 def open_gltf(
     path: Path, document: object, binary: bytes | None = None, budget: Budget | None = None
 ) -> Document:
-    """A glTF whose JSON is parsed.
+    """A glTF from parsed JSON.
 
     Args:
-        path: of the file; its buffers are looked for beside it, and errors name it.
+        path: path of the file; its buffers are in the same folder, and errors name it.
         document: the parsed JSON.
-        binary: the binary chunk of a GLB; None: there is none.
-        budget: bounds memory and work; None: that of a small file.
+        binary: the binary chunk of a GLB, or None.
+        budget: limits memory and work; None: the budget of a small file.
 
     Raises:
-        AnimationFileError: no glTF of version 2.
+        AnimationFileError: not a glTF of version 2.
     """
     if not is_gltf(document) or not isinstance(document, dict):
         raise AnimationFileError(str(path), "asset.version of a glTF was expected")
@@ -405,17 +406,17 @@ def open_gltf(
 def read(document: Document, take: str | None = None) -> Take:
     """The curves of an animation.
 
-    A morph target's curve has the target's name: extras.targetNames of its mesh, as exporters
-    write them, else "mesh.number". A property that KHR_animation_pointer animates has the name at
-    the end of its pointer. Meshes that share a target's name move together as a rule: their curve
-    is taken once.
+    The curve of a morph target has the target's name from extras.targetNames of its mesh, which
+    exporters write, else "mesh.number". The curve of a property that KHR_animation_pointer animates
+    has the last name of its pointer. Meshes that share a target's name normally move together: only
+    one curve is taken.
 
     Args:
-        document: of `open_glb` or `open_gltf`.
-        take: name or number of an animation; None: the first that moves any of that.
+        document: from `open_glb` or `open_gltf`.
+        take: name or number of an animation; None: the first that animates any of these.
 
     Raises:
-        AnimationFileError: no such animation, parts of it that are not there.
+        AnimationFileError: no such animation, or missing parts of it.
     """
     notes: list[str] = []
     animations = document.json.get("animations")
@@ -488,7 +489,7 @@ def _is_same(a: Keys, b: Keys) -> bool:
 
 
 def _names(document: Document, target: Mapping[str, Any], place: str) -> list[str]:
-    """Curves that a channel holds; none of a node's place, rotation or scale."""
+    """The curves of a channel; empty for location, rotation or scale of a node."""
     if target.get("path") == "weights":
         node = document.item("nodes", target.get("node"), f"{place}.target.node")
         return _target_names(document, node.get("mesh"), place)
@@ -510,7 +511,7 @@ def _names(document: Document, target: Mapping[str, Any], place: str) -> list[st
                 place, f"a weight of {len(names)} was expected, found {path[:80]!r}"
             )
         return [names[int(parts[3])]]
-    # Colours, positions and the like are no curves of a face; properties in extras may be.
+    # Colours, positions and so on are not curves of a face; properties in extras may be.
     return [parts[-1]] if "extras" in parts and parts[-1] != "extras" else []
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Values of a JSON, checked: numbers, names, rates and times, and the Take that they make."""
+"""Checked values of JSON: numbers, names, rates and times, and the Take made from them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate", "sampleRate")
-# Frames a second; a rate outside this range is taken for a damaged number.
+# Range of frames per second; a rate outside is taken as a damaged number.
 SLOWEST, FASTEST = 0.01, 1e6
 _LARGEST = float(np.finfo(np.float32).max)
 
 
 class Reader:
-    """One file, its budget, and what the caller says of its time."""
+    """One file, its budget, and the caller's options on time."""
 
     def __init__(self, name: str, asked: Asked, budget: Budget) -> None:
         self.name = name
@@ -35,20 +35,21 @@ class Reader:
         """An AnimationFileError that names the file.
 
         Args:
-            message: what was expected and what was found.
-            place: where in the JSON, e.g. "frames[3]"; None: the whole of it.
+            message: the expected and the found value.
+            place: in the JSON, e.g. "frames[3]"; None: the whole document.
         """
         return AnimationFileError(self.name, f"{place}: {message}" if place else message)
 
     def number(self, value: object, place: str) -> float:
-        """A finite number that a float32 holds; some software writes numbers as text.
+        """A finite number within float32; texts are accepted because some software writes numbers
+        so.
 
         Args:
             value: a value of the JSON.
-            place: what errors call it.
+            place: its name in errors.
 
         Raises:
-            AnimationFileError: it is none.
+            AnimationFileError: not such a number.
         """
         found = math.nan
         if isinstance(value, int | float | str) and not isinstance(value, bool):
@@ -65,11 +66,11 @@ class Reader:
 
         Args:
             values: a value of the JSON.
-            place: what errors call it.
-            has_holes: null is a value that is not there, and comes as NaN for `take` to fill.
+            place: its name in errors.
+            has_holes: null means a missing value and becomes NaN, which `take` fills.
 
         Raises:
-            AnimationFileError: it is no list, or something in it is no such number.
+            AnimationFileError: not a list, or an item that is not such a number.
         """
         if not isinstance(values, list):
             raise self.fail(f"a list of numbers was expected, found {_kind(values)}", place)
@@ -83,17 +84,17 @@ class Reader:
 
         Args:
             values: a value of the JSON.
-            place: what errors call it.
+            place: its name in errors.
 
         Raises:
-            AnimationFileError: it is no list, or something in it is no text.
+            AnimationFileError: not a list, or an item that is not text.
         """
         if not isinstance(values, list) or not all(isinstance(v, str) for v in values):
             raise self.fail(f"a list of names was expected, found {_kind(values)}", place)
         return values
 
     def rate_of(self, *tables: object) -> float | None:
-        """Frames a second: as the caller says, else as the first of these tables does."""
+        """Frames per second: from the caller, else from the first of these tables that has them."""
         if self.asked.rate is not None:
             return self.asked.rate
         for table in tables:
@@ -102,14 +103,14 @@ class Reader:
         return None
 
     def frames_a_second(self, value: object, place: str) -> float:
-        """A rate from SLOWEST to FASTEST frames a second.
+        """A rate from SLOWEST to FASTEST frames per second.
 
         Args:
             value: a value of the JSON.
-            place: what errors call it.
+            place: its name in errors.
 
         Raises:
-            AnimationFileError: it is no number, or outside that range.
+            AnimationFileError: not a number, or out of range.
         """
         rate = self.number(value, place)
         if not SLOWEST <= rate <= FASTEST:
@@ -121,17 +122,17 @@ class Reader:
         return rate
 
     def times(self, given: object, count: int, rate: float | None, place: str) -> Doubles:
-        """float64[count] seconds of frames: as given, else by the rate from 0 on.
+        """float64[count] seconds of frames: the given times, else by the rate from 0 on.
 
         Args:
-            given: a list of times out of the JSON, or None.
-            count: how many frames there are.
-            rate: frames a second; None: unknown.
-            place: the key of the times, which may say their unit, and what errors call them.
+            given: a list of times from the JSON, or None.
+            count: number of frames.
+            rate: frames per second; None: unknown.
+            place: the key of the times, which may contain their unit; also their name in errors.
 
         Raises:
-            AnimationFileError: another number of times, neither times nor a rate, a unit that
-                nobody knows.
+            AnimationFileError: a different number of times, neither times nor a rate, an unknown
+                unit.
         """
         asked = self.asked._replace(rate=rate)
         if given is None or asked.counts_rows:
@@ -145,16 +146,16 @@ class Reader:
     def take(
         self, names: Sequence[str], rows: npt.ArrayLike, times: Doubles, rate: float | None = None
     ) -> Take:
-        """A Take of curves; frames whose time does not ascend are left out and noted.
+        """A Take of curves; frames whose time does not ascend are dropped and noted.
 
         Args:
-            names: of the curves, each once.
-            rows: float[controls, frames]; NaN where a value is not there.
+            names: names of the curves, each once.
+            rows: float[controls, frames]; NaN for missing values.
             times: float64[frames], seconds.
-            rate: frames a second; None: told from the times.
+            rate: frames per second; None: inferred from the times.
 
         Raises:
-            AnimationFileError: a name that stands there twice.
+            AnimationFileError: a repeated name.
         """
         if len(set(names)) != len(names):
             twice = next(name for name in names if list(names).count(name) > 1)
@@ -175,14 +176,14 @@ def first_key(table: Mapping[str, object], keys: Sequence[str]) -> str | None:
     """The first of some keys that a table has, or None.
 
     Args:
-        table: of the JSON.
-        keys: in the order of their rank.
+        table: table of the JSON.
+        keys: in the order of preference.
     """
     return next((key for key in keys if key in table), None)
 
 
 def _shown(value: object) -> str:
-    """A value as messages show it; of a list or a table what it is, however deep it goes."""
+    """A value for messages; for a list or table, only its kind."""
     if isinstance(value, dict | list):
         return _kind(value)
     is_long = isinstance(value, int) and abs(value) >= 1 << 64

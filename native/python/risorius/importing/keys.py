@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves as keys, each with times of its own, and how they come to share one clock."""
+"""Curves as keys with individual times, and their resampling to common times."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ Doubles = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
 CONSTANT, LINEAR, CUBIC = 0, 1, 2
-# Bytes that a value of a curve takes on its way to a clip: as float64 twice, as float32 once.
+# Memory of one value on its way to a clip: float64 twice, float32 once.
 VALUE_BYTES = 20
 
 
 @dataclass
 class Keys:
-    """Keys of one curve.
+    """The keys of one curve.
 
     Attributes:
         times: float64[keys], seconds, ascending.
         values: float64[keys].
-        kinds: uint8[keys], how the curve goes on after each key; empty: straight throughout.
-        leave: float64[keys], slope after each key, per second; empty unless a key is CUBIC.
-        arrive: float64[keys], slope before each key, per second.
+        kinds: uint8[keys], interpolation after each key; empty: linear everywhere.
+        leave: float64[keys], slope after each key per second; empty unless a key is CUBIC.
+        arrive: float64[keys], slope before each key per second.
     """
 
     times: Doubles
@@ -42,7 +42,7 @@ class Keys:
         return self.kinds.size == 0 or bool((self.kinds[:-1] == LINEAR).all())
 
     def sample(self, at: Doubles) -> Doubles:
-        """Values at times, held before the first key and after the last."""
+        """Values at times, constant before the first and after the last key."""
         if self.times.size == 0:
             return np.zeros(at.size)
         straight = np.interp(at, self.times, self.values)
@@ -71,22 +71,22 @@ class Keys:
 def on_one_clock(
     curves: Sequence[Keys], rate: float | None, budget: Budget
 ) -> tuple[Doubles, Doubles]:
-    """All curves at the times of all keys.
+    """All curves at the union of their key times.
 
-    Straight lines between the frames are then the curves themselves. Curves that bend or step are
-    also taken `rate` times a second.
+    Linear curves are then exact. Smooth and stepped curves are also sampled `rate` times per
+    second.
 
     Args:
-        rate: frames a second, or None: nothing between keys.
-        budget: of the file.
+        rate: frames per second, or None for no samples between keys.
+        budget: budget of the file.
 
     Returns:
         float64[frames] seconds; float64[curves, frames].
 
     Raises:
-        BudgetError: many curves with keys at many times, or keys that lie far apart.
+        BudgetError: too many curves with keys at different times, or keys too far apart.
     """
-    # Curves of one clock share the array of its times as a rule.
+    # Curves with common times normally share one array.
     parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))
@@ -97,7 +97,7 @@ def on_one_clock(
         _take(len(curves), (times[-1] - times[0]) * rate, times, budget)
         count = int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1
         times = np.union1d(times, times[0] + np.arange(count) / rate)
-    # Key times that were rounded apart by a tool are one time.
+    # Key times that differ only by rounding are one time.
     times = times[np.concatenate([[True], np.diff(times) > 1e-6])]
     _take(len(curves), times.size, times, budget)
     rows = np.empty((len(curves), times.size))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mappings: which controls each curve of a file moves, as TOML that one can edit and share."""
+"""Mappings from a file's curves to controls, as TOML that users can edit and share."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from .errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 Row = dict[str, float]
 
-# Curves that are no raw controls of a rig: head and neck, and the eyes as angles; radians.
+# Curves that are not raw controls: angles of head, neck and eyes in radians.
 HEAD_ANGLES = ("head.yaw", "head.pitch", "head.roll", "neck.yaw", "neck.pitch", "neck.roll")
 ANGLES = (*HEAD_ANGLES, "eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _KEYS = {
@@ -43,22 +43,22 @@ _KEYS = {
 VOWELS = "AIUEO"
 _WITH_UNITS = (ARKIT, "vrm")
 _OLD_BASES = {"arkit units": "vocabulary arkit", "vrm expressions": "vocabulary vrm"}
-_PATTERN_STEPS = 50  # of a budget, to look whether a pattern fits a name
-# Seconds between keys of curves that were keyed; between frames that are added to them; how many.
+_PATTERN_STEPS = 50  # steps of a budget to compare a pattern with a name
+# Seconds between keys of a keyed curve; between frames added to it; the most added per gap.
 _KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
 
 
 class MappingError(AnimationFileError):
-    """A mapping that does not hold together."""
+    """An inconsistent mapping."""
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """What is done to the curve of a control: offset + gain * curve(value).
+    """The change of a control's curve: offset + gain * curve(value).
 
     Attributes:
-        points: (value, result) by ascending value, joined by straight lines, held outside; empty:
-            the value itself.
+        points: (value, result) by ascending value, linear between, constant outside; empty:
+            identity.
     """
 
     gain: float = 1.0
@@ -74,22 +74,22 @@ class Adjustment:
 
 @dataclass(frozen=True)
 class Mapping:
-    """Rows of a mapping, with names in full.
+    """The rows of a mapping, with full names.
 
     Attributes:
-        name: of the file, without its suffix.
+        name: name of the file, without suffix.
         description: a sentence.
-        rows: curve of the source -> {control: weight}. A name with * stands for many; the * of its
-            control is what the * of the curve was. A row that is empty leaves the curve out.
-        shares: control -> the control that it takes back a share of: the value that the rows give
-            it is divided by the value that they give the other one (controls.shares.share_of). It
-            is left as it is where no curve moves the other one.
-        controls: pattern of control names -> what is done to them; the last that fits counts.
-        strip: beginnings that curve names may have, and that say nothing.
-        vocabulary: of controls.vocabulary, whose spellings of its names are known as well.
-        is_loose: letter case, "_" and Left or L at the end make no difference.
-        is_gui: the controls are GUI controls, which a rig's own table turns into raw ones.
-        metadata: anything; it travels into the clip.
+        rows: curve of the source -> {control: weight}. * in a name matches any text; * in its
+            controls is replaced by that text. An empty row ignores the curve.
+        shares: control -> the control of which it takes back a share: the value that the rows give
+            it is divided by the other control's value (controls.shares.share_of). It is left
+            unchanged if no curve moves the other one.
+        controls: pattern of control names -> adjustment; the last match counts.
+        strip: prefixes of curve names that are ignored.
+        vocabulary: name in controls.vocabulary; its other spellings are accepted too.
+        is_loose: ignore letter case, "_" and the difference of Left and L at the end.
+        is_gui: the controls are GUI controls, which the rig's table converts to raw ones.
+        metadata: free; copied to the clip.
     """
 
     name: str
@@ -104,13 +104,13 @@ class Mapping:
     metadata: Table[str, str] = field(default_factory=dict)
 
     def targets(self) -> tuple[str, ...]:
-        """All controls, in the order of the rows; with patterns as they are."""
+        """All controls, in the order of the rows; patterns stay patterns."""
         return tuple(dict.fromkeys(control for row in self.rows.values() for control in row))
 
     def finder(self) -> Callable[[str], tuple[str, Row] | None]:
         """A function: curve of a source -> (row's name, {control: weight}), or None."""
         exact = {loose_name(key) if self.is_loose else key: key for key in self.rows}
-        exact.pop("", None)  # of a name without letters
+        exact.pop("", None)  # for a name without letters
         patterns = [key for key in self.rows if "*" in key]
 
         def find(name: str) -> tuple[str, Row] | None:
@@ -130,8 +130,8 @@ class Mapping:
         return find
 
     def _spellings(self, name: str) -> Iterator[str]:
-        """A name as it is; then without a known beginning; then without a mesh's name before it;
-        then as the vocabulary spells it."""
+        """The name itself, without a known prefix, without a mesh's name, and in the vocabulary's
+        spelling."""
         yield name
         for start in self.strip:
             if name.lower().startswith(start.lower()) and len(name) > len(start):
@@ -144,7 +144,7 @@ class Mapping:
                 yield spelled
 
     def adjustment(self, control: str) -> Adjustment | None:
-        """What is done to a control, or None."""
+        """The adjustment of a control, or None."""
         last = None
         for pattern, what in self.controls.items():
             if fits(control, pattern):
@@ -154,7 +154,7 @@ class Mapping:
 
 @dataclass
 class Mapped:
-    """Curves after a mapping, and what became of each name."""
+    """Curves after a mapping, and the use of each name."""
 
     clip: Clip
     mapped: dict[str, tuple[str, ...]]
@@ -165,14 +165,14 @@ class Mapped:
 
 
 def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
-    """The controls that a clip of a source's curves gives.
+    """The controls that a mapping computes from a clip of a source's curves.
 
-    Curves that move one control are added up, weighted; then a control that is a share of another
-    is divided by that one, and adjusted. A curve that is one control with weight 1, and neither a
-    share nor adjusted, keeps its bits.
+    Curves that move one control are added with their weights; then a control that is a share of
+    another is divided by that one, and adjusted. A curve that gives one control with weight 1,
+    without share or adjustment, keeps its bits.
 
     Raises:
-        BudgetError: a mapping of so many controls or patterns that the clip cannot be worth them.
+        BudgetError: too many controls or patterns for the size of the clip.
     """
     budget, place = Budget.of(clip.curves.nbytes), f"mapping {mapping.name}"
     patterns = sum("*" in key for key in mapping.rows) * (1 + len(mapping.strip))
@@ -221,7 +221,7 @@ def apply_rows(mapping: Mapping, clip: Clip) -> Mapped:
 def _divided(
     mapping: Mapping, clip: Clip, sums: dict[str, Doubles], budget: Budget
 ) -> tuple[Clip, dict[str, Doubles]]:
-    """The sums with shares in place of what they are shares by, and the clip at their times."""
+    """The sums with amounts replaced by shares, and the clip at their times."""
     place = f"mapping {mapping.name}"
     shares = [(c, w) for c, w in mapping.shares.items() if c in sums and w in sums]
     times = _between(clip.frame_times()) if any(sums[c].any() for c, _ in shares) else None
@@ -236,14 +236,14 @@ def _divided(
 
 
 def _between(times: Doubles) -> Doubles | None:
-    """Times with some between keys that lie far apart: a straight share of a straight control would
-    not be straight there, and lips that are shut at both keys would part between them.
+    """Add times between keys that lie far apart. A quotient of linear curves is not linear, and
+    lips that are shut at both keys would part between them.
 
     Args:
         times: float64[frames], seconds.
 
     Returns:
-        None where there is nothing to add: a capture has frames enough, and its gaps are gaps.
+        None if nothing is added: a capture has enough frames, and its gaps stay gaps.
     """
     steps = np.diff(times)
     if len(steps) == 0 or np.median(steps) <= _KEYED:
@@ -255,13 +255,13 @@ def _between(times: Doubles) -> Doubles | None:
 
 
 def fits(control: str, pattern: str) -> bool:
-    """Whether a pattern with * and ? fits a control, its prefix written or not; case counts."""
+    """Whether a pattern with * and ? matches a control, with or without its prefix; case counts."""
     short = control.partition(".")[2] if control.startswith("CTRL_expressions.") else control
     return fnmatch.fnmatchcase(control, pattern) or fnmatch.fnmatchcase(short, pattern)
 
 
 def _star(pattern: str, name: str) -> str | None:
-    """What a pattern's * is in a name, or None if the pattern does not fit."""
+    """The text that a pattern's * matches in a name, or None if it does not match."""
     before, _, after = pattern.partition("*")
     if len(name) < len(before) + len(after) or not (
         name.startswith(before) and name.endswith(after)
@@ -275,8 +275,7 @@ def _folder() -> Traversable:
 
 
 def mapping_names() -> list[str]:
-    """Names of the mappings that come with Risorius: files of their own, and one for each
-    vocabulary."""
+    """Names of the built-in mappings: their own files, and one for each vocabulary."""
     return sorted({*_files(), *vocabulary.names()})
 
 
@@ -287,17 +286,17 @@ def _files() -> frozenset[str]:
 
 
 def mapping_title(name: str) -> str:
-    """What people call a mapping that comes with Risorius: its vocabulary's title, or its name."""
+    """The title of a built-in mapping: its vocabulary's title, or its name."""
     if name in vocabulary.names():
         return vocabulary.vocabulary(name).title
     return name.replace("_", " ").title()
 
 
 def mapping_text(name: str) -> str:
-    """The TOML of a mapping that comes with Risorius, to be saved and edited.
+    """The TOML of a built-in mapping, for saving and editing.
 
     Raises:
-        MappingError: no such mapping.
+        MappingError: unknown name.
     """
     if name not in mapping_names():
         raise MappingError(name, f"one of {', '.join(mapping_names())} was expected")
@@ -312,10 +311,10 @@ def mapping_text(name: str) -> str:
 
 
 def load_mapping(source: str | os.PathLike[str] | Mapping) -> Mapping:
-    """A mapping: one that comes with Risorius by its name, or a TOML file.
+    """A mapping: a built-in one by name, or a TOML file.
 
     Raises:
-        MappingError: not there, no TOML, or rows that do not hold together; with the place.
+        MappingError: missing, not TOML, or inconsistent rows; with the place.
     """
     if isinstance(source, Mapping):
         return source
@@ -344,8 +343,8 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
     Args:
         text: TOML.
-        where: what messages name it.
-        name: the mapping's name, if it gives none.
+        where: its name in messages.
+        name: the mapping's name, unless the text has one.
 
     Raises:
         MappingError: see load_mapping.
@@ -361,7 +360,7 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
     prefix = _text(table, "prefix", where)
     rows = {key: _row(key, row, prefix, where) for key, row in _table(table, "rows", where).items()}
     rows |= {key: {} for key in _texts(table, "ignore", where)}
-    for key in mapping.rows:  # a row of the base is replaced under its exact spelling only
+    for key in mapping.rows:  # a row of the base is replaced only under its exact spelling
         if key not in rows and loose_name(key) in {loose_name(own) for own in rows}:
             raise MappingError(where, f"rows: {key} is in the base with another spelling")
     shares = _shares(_table(table, "shares", where), prefix, where)
@@ -388,10 +387,9 @@ def parse_mapping(text: str, where: str, name: str = "") -> Mapping:
 
 
 def _base(table: Table[str, Any], where: str) -> Mapping:
-    """The mapping whose rows come first.
+    """The mapping whose rows are the base of another.
 
-    "vocabulary NAME" is one of controls.vocabulary; those that are ARKit's or VRM's have the units
-    with them.
+    "vocabulary NAME" is one of controls.vocabulary; ARKit's and VRM's include the ARKit units.
     """
     base = _text(table, "base", where)
     if not base:
@@ -411,7 +409,7 @@ def _base(table: Table[str, Any], where: str) -> Mapping:
 
 
 def row_of(said: Meaning) -> Row:
-    """The controls of a name's meaning, those of the library's expression where it is one alone."""
+    """The controls of a name's meaning; for an expression of the library, its controls."""
     if said.controls or not said.expression:
         return dict(said.controls)
     return dict(expressions.get(said.expression).weights)
@@ -455,9 +453,9 @@ def _table(table: Table[str, Any], key: str, where: str) -> dict[str, Any]:
 def _row(key: str, value: object, prefix: str, where: str) -> Row:
     """A row's controls in full.
 
-    "@PP" is the pose of the expression PP, weighted; a name that ends in * stands for both sides,
-    in ** for the four lip quarters, unless the row is a pattern itself; a name without a dot gets
-    the prefix.
+    "@PP" is the weighted pose of the expression PP. A name ending in * stands for both sides, in **
+    for the four lip quarters, unless the row itself is a pattern. A name without a dot gets the
+    prefix.
     """
     if isinstance(value, str):
         value = {"@" + value: 1.0}
@@ -488,7 +486,7 @@ def _row(key: str, value: object, prefix: str, where: str) -> Row:
 
 
 def _expression(name: str, at: str, where: str) -> Table[str, float]:
-    """The pose of an expression by its name."""
+    """The pose of an expression."""
     try:
         return expressions.get(name).weights
     except ValueError as error:
@@ -496,9 +494,9 @@ def _expression(name: str, at: str, where: str) -> Table[str, float]:
 
 
 def _shares(table: Table[str, Any], prefix: str, where: str) -> dict[str, str]:
-    """Shares with names in full; "" takes a share of the base away.
+    """Shares with full names; "" removes a share of the base.
 
-    No control is a share of a share: both would have to be divided in their order.
+    No control is a share of a share, because both would have to be divided in order.
     """
     out: dict[str, str] = {}
     for key, value in table.items():
@@ -541,14 +539,14 @@ def _number(value: object, at: str, where: str) -> float:
 
 
 def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
-    """What of a mapping a rig does not have.
+    """The controls of a mapping that a rig lacks.
 
     Args:
-        mapping: to be checked.
-        rig_names: raw controls of the rig; its GUI controls, if the mapping is of those.
+        mapping: the mapping.
+        rig_names: raw controls of the rig, or its GUI controls if the mapping uses these.
 
     Returns:
-        Sentences; none if all is well.
+        Sentences; empty if the rig has all.
     """
     known = set(rig_names)
     out = []
@@ -562,15 +560,15 @@ def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
 
 
 def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> str | None:
-    """The built-in mapping that knows most of these curves; None if none is sure to.
+    """The built-in mapping that knows most of these curves; None if none clearly fits.
 
-    Of equals the one that knows more of all columns, then the one with fewer rows: it was made for
-    less. A letter alone decides nothing, as mouth shapes of several vocabularies are letters; the
-    vowels A, I, U, E, O together are VRM.
+    Of equals, the one that knows more of all columns wins, then the one with fewer rows, which is
+    more specific. Single letters decide nothing, because several vocabularies have mouth shapes
+    that are letters; but the vowels A, I, U, E, O together are VRM.
 
     Args:
-        names: of the curves that say something.
-        columns: of all curves; None: the same.
+        names: curves that are not constantly 0.
+        columns: all curves; None: the same.
     """
     columns = names if columns is None else columns
     letters = {name.upper() for name in columns if len(name) == 1}
@@ -585,18 +583,18 @@ def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> 
         is_sure = is_vowels or not all(map(_is_letter, hits))
         if is_sure and (found := hits.intersection(names)):
             scores.append((-len(found), -len(hits), len(mapping.rows), mapping.name))
-    if len(known[ARKIT]) >= arkit.FULL_SET:  # the expressions of VRM repeat the units
+    if len(known[ARKIT]) >= arkit.FULL_SET:  # VRM expressions repeat the units
         scores = [score for score in scores if score[-1] != "vrm"]
     return min(scores)[-1] if scores else None
 
 
 def _is_letter(curve: str) -> bool:
-    """Whether a name is a letter alone, which many vocabularies have; kana are MikuMikuDance's."""
+    """Whether a name is a single letter, which many vocabularies have; kana are MikuMikuDance's."""
     return len(curve) == 1 and curve.isascii()
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """The mappings that know curves which are a letter each; none if not all of them are."""
+    """The mappings that know single-letter curves; empty unless all curves are letters."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""JSON of named curves, in the shapes that software writes: by frame, by curve, or as keys."""
+"""Reads JSON of named curves in the layouts of various software: by frame, by curve, or as keys."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NAME_KEYS = (
 )  # fmt: skip
 MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
-# NeuroSync returns rows without names: Live Link Face's columns, and seven emotions after them.
+# NeuroSync returns rows without names: Live Link Face's columns, then seven emotions.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
 NEUROSYNC_RATE = 60.0
 KEYS_KEYS = ("Keys", "keys")
@@ -35,14 +35,14 @@ DEEPEST = 64
 
 
 def parse(text: str, name: str) -> object:
-    """The document that a JSON text holds.
+    """The document in a JSON text.
 
     Args:
-        text: of the file.
-        name: what errors call the file.
+        text: content of the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: no JSON, with line and column; nested too deeply.
+        AnimationFileError: not JSON, with line and column; nested too deeply.
     """
     try:
         return json.loads(text)
@@ -59,17 +59,17 @@ def parse(text: str, name: str) -> object:
 def read(
     document: object, name: str, asked: Asked | None = None, budget: Budget | None = None
 ) -> Take:
-    """Curves of a document, by the first shape that fits.
+    """The curves of a document, by the first layout that fits.
 
     Args:
         document: parsed JSON.
-        name: what errors call the file.
-        asked: what the caller says of its time; it wins over what the file says. None: nothing.
-        budget: bounds memory and work; None: that of a small file.
+        name: the file's name in errors.
+        asked: the caller's options on time, which override the file. None: no options.
+        budget: limits memory and work; None: the budget of a small file.
 
     Raises:
-        AnimationFileError: none of the shapes, or one that does not hold together.
-        BudgetError: far more curves and frames than a file of this size may hold.
+        AnimationFileError: no known layout, or an inconsistent one.
+        BudgetError: far more curves and frames than a file of this size may have.
     """
     reader = Reader(name, asked or Asked(), budget or Budget.of(0))
     for shape in (
@@ -91,14 +91,14 @@ def read(
 
 
 def own_clip(reader: Reader, document: object) -> Take | None:
-    """The shape that `importing.write_json` writes, or None where the document has another shape.
+    """The layout of `importing.write_json`; None if the document has another one.
 
     Args:
-        reader: of the file, for its errors.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
-        AnimationFileError: it has that shape and does not hold together.
+        AnimationFileError: this layout, but inconsistent.
     """
     if not isinstance(document, dict) or "risorius_clip" not in document:
         return None
@@ -145,15 +145,15 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 def matrix(reader: Reader, document: object) -> Take | None:
     """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
 
-    A frame may be a table with the values under "weights" and a time. None where the document has
-    another shape.
+    A frame may be a table with the values under "weights" and a time. Returns None for another
+    layout.
 
     Args:
-        reader: of the file, for its errors.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
-        AnimationFileError: it has that shape and does not hold together.
+        AnimationFileError: this layout, but inconsistent.
     """
     if not isinstance(document, dict):
         return None
@@ -199,14 +199,14 @@ def matrix(reader: Reader, document: object) -> Take | None:
 def neurosync(reader: Reader, document: object) -> Take | None:
     """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
 
-    None where the document has another shape.
+    Returns None for another layout.
 
     Args:
-        reader: of the file, for its errors and its notes.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
-        AnimationFileError: it has that shape and does not hold together.
+        AnimationFileError: this layout, but inconsistent.
     """
     rows = document.get("blendshapes") if isinstance(document, dict) else None
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
@@ -232,17 +232,17 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}, the values under a key of their own or not.
+    """A list of frames {time, name: value, ...}; the values may be under a key of their own.
 
-    None where the document has another shape.
+    Returns None for another layout.
 
     Args:
-        reader: of the file, for its errors and its budget.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
-        AnimationFileError: it has that shape and does not hold together.
-        BudgetError: far more curves and frames than a file of this size may hold.
+        AnimationFileError: this layout, but inconsistent.
+        BudgetError: far more curves and frames than a file of this size may have.
     """
     frames: object = document
     outer: dict[str, Any] = {}
@@ -254,7 +254,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Curves with keys, and rows of a curve table, are lists of tables too.
+    # Keyed curves and rows of a curve table are lists of tables too.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
@@ -272,7 +272,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
-    """name -> value of a frame."""
+    """name -> value in a frame."""
     at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
     table = frame[at] if at else frame
     return {
@@ -289,12 +289,12 @@ def _frame_column(
     values = [reader.number(tables[i][curve], f"frame {i}, {curve}") for i in known]
     if len(known) < len(tables):
         reader.notes.append(f"{curve}: missing in {len(tables) - len(known)} frame(s), filled")
-    at = np.maximum.accumulate(clock)  # frames whose time goes back are left out later
+    at = np.maximum.accumulate(clock)  # frames whose time goes back are dropped later
     return np.interp(at, at[known], values)
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key of a time, or of a list of times; of frame numbers only where there is no time."""
+    """The key of a time, or of a list of times; a frame number only if there is no time."""
     found = [
         (name.unit == FRAMES, key)
         for key, value in table.items()
@@ -305,14 +305,15 @@ def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None: other shape.
+    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None: another
+    layout.
 
     Args:
-        reader: of the file, for its errors.
-        document: parsed JSON; the keys beside "Name" are seconds.
+        reader: reader of the file.
+        document: parsed JSON; the keys other than "Name" are seconds.
 
     Raises:
-        AnimationFileError: a value that is no finite number.
+        AnimationFileError: a value that is not a finite number.
     """
     if not _is_tables(document) or not isinstance(document, list):
         return None
@@ -329,13 +330,13 @@ def curve_table(reader: Reader, document: object) -> Take | None:
 
 
 def keyed_curves(reader: Reader, document: object) -> Take | None:
-    """Curves with keys {Time, Value}, wherever in the document they stand.
+    """Curves with keys {Time, Value}, anywhere in the document.
 
-    So an Unreal animation's FloatCurves are written, [{CurveName, FloatCurve: {Keys: [...]}}]. None
-    where there are no such curves.
+    An Unreal animation's FloatCurves have this layout: [{CurveName, FloatCurve: {Keys: [...]}}].
+    Returns None if there are no such curves.
 
     Args:
-        reader: of the file, for its errors and its notes.
+        reader: reader of the file.
         document: parsed JSON; times are seconds.
 
     Raises:
@@ -393,16 +394,16 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 
 
 def lists_by_name(reader: Reader, document: object) -> Take | None:
-    """{name: [values], ...}, or the same under "curves", with a rate or a list of times.
+    """{name: [values], ...}, optionally under "curves", with a rate or a list of times.
 
-    None where the document has another shape.
+    Returns None for another layout.
 
     Args:
-        reader: of the file, for its errors.
+        reader: reader of the file.
         document: parsed JSON.
 
     Raises:
-        AnimationFileError: lists of different lengths, a value that is no number, no time.
+        AnimationFileError: lists of different lengths, a value that is not a number, no times.
     """
     if not isinstance(document, dict):
         return None
@@ -427,7 +428,7 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
 
 
 def _is_rows(value: object) -> bool:
-    """A list of lists, or of tables with a list in each."""
+    """Whether a value is a list of lists, or of tables with a list in each."""
     if not isinstance(value, list) or not value:
         return False
     return all(

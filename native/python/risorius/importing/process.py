@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is done to a clip between a capture and a face: each a function from clip to clip."""
+"""Processing steps between a capture and a face; each takes a clip and returns a clip."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from .mapping import ANGLES, fits
 
 Doubles = npt.NDArray[np.float64]
 
-# Where the neutral value leaves a smaller range than this, stretching would only amplify noise.
+# If the neutral value leaves a smaller range, stretching would only amplify noise.
 LEAST_RANGE = 0.05
 # Mirroring a face negates these angles.
 _MIRRORED_ANGLES = ("yaw", "roll")
 
 
 def resample(clip: Clip, rate: float) -> Clip:
-    """The clip at even times from its first frame to its last; straight lines between its frames.
+    """The clip at even times from its first frame to its last, linear between its frames.
 
     Args:
         clip: any clip.
-        rate: frames a second of the result, above 0.
+        rate: frames per second of the result, above 0.
 
     Raises:
         ValueError: a rate that is not above 0.
@@ -43,7 +43,7 @@ def resample(clip: Clip, rate: float) -> Clip:
 
 
 def shift(clip: Clip, seconds: float) -> Clip:
-    """The clip and its events, later by `seconds`; negative: earlier."""
+    """The clip and its events, later by `seconds`; negative values: earlier."""
     times = None if clip.times is None else clip.times + seconds
     events = [event._replace(time=event.time + seconds) for event in clip.events]
     return clip.replaced(start=clip.start + seconds, times=times, events=events)
@@ -53,7 +53,7 @@ def cut(clip: Clip, first: float, last: float) -> Clip:
     """The frames and events from `first` to `last`, seconds on the clip's clock, both included.
 
     Raises:
-        ValueError: no frame lies there.
+        ValueError: there is no frame in this range.
     """
     at = clip.frame_times()
     keep = (at >= first - 1e-9) & (at <= last + 1e-9)
@@ -76,11 +76,11 @@ def adjust(
 
     Args:
         clip: any clip.
-        gains: pattern of control names -> factor; of several that fit, all are multiplied.
-        offsets: pattern -> what is added after that; of several, all are added.
+        gains: pattern of control names -> factor; the factors of all matches are multiplied.
+        offsets: pattern -> offset, added after that; the offsets of all matches are added.
 
     Raises:
-        ValueError: a pattern that fits no control.
+        ValueError: a pattern that matches no control.
     """
     curves = clip.curves.astype(np.float64)
     for table, is_gain in ((gains or {}, True), (offsets or {}, False)):
@@ -93,20 +93,20 @@ def adjust(
 
 
 def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
-    """Make a neutral face neutral: subtract it, and stretch the rest so that full stays full.
+    """Make the neutral face neutral: subtract it, and stretch the rest so that 1 stays 1.
 
-    A control whose neutral value is n becomes (value - n) / (1 - n), and 0 where that is negative
-    and the control never was. Of the head and the eyes the angles are subtracted only. A control
-    that says which share of another it takes back (lips of an open jaw) is calibrated as the part
-    that it takes back: a face at rest with shut lips may have any share.
+    A control with the neutral value n becomes (value - n) / (1 - n), and 0 if that is negative and
+    the control never was. Angles of the head and the eyes are only subtracted. A control that is a
+    share of another (lips of an open jaw) is calibrated as an amount, because a resting face with
+    shut lips may have any share.
 
     Args:
-        clip: a capture with a stretch of neutral face in it.
+        clip: a capture that contains a neutral face.
         first: frame of the neutral face, from 0.
-        last: last frame, if it is the mean of several; included.
+        last: last frame (inclusive), to use the mean of several.
 
     Raises:
-        ValueError: frames that the clip does not have.
+        ValueError: frames out of range.
     """
     last = first if last is None else last
     if not 0 <= first <= last < clip.frame_count:
@@ -130,20 +130,20 @@ def calibrate(clip: Clip, first: int, last: int | None = None) -> Clip:
 
 
 def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
-    """Savitzky-Golay: fit a polynomial around each frame; peaks keep their height and their time.
+    """Savitzky-Golay: fit a polynomial around each frame; peaks keep their height and time.
 
-    Polynomials up to `order` pass unchanged, at the ends too; nothing is delayed; no curve leaves
-    the range that it had. A clip with times of its own is smoothed by frame, as captures are taken
-    at even times but for what was dropped.
+    Polynomials up to `order` pass unchanged, also at the ends; there is no delay; no curve leaves
+    its old range. A clip with individual times is smoothed by frame, because captures have even
+    times except for dropped frames.
 
     Args:
-        clip: any clip; one with fewer frames than the window is returned as it is.
-        window: seconds of frames that each fit takes, above 0.
+        clip: any clip; it is returned unchanged if it has fewer frames than the window.
+        window: seconds of each fit, above 0.
         order: degree of the polynomial, 0 or more.
 
     Raises:
-        ValueError: a window or an order that makes no sense.
-        BudgetError: a window of so many frames that the fit would fill the memory.
+        ValueError: an invalid window or order.
+        BudgetError: a window of too many frames for the memory.
     """
     if not window > 0.0 or order < 0:
         raise ArgumentError(f"a window above 0 s was expected, found {window:g} s, degree {order}")
@@ -154,7 +154,7 @@ def smooth(clip: Clip, window: float, *, order: int = 3) -> Clip:
     budget.hold((2 * half + 1) ** 2 * 24, f"a window of {window:g} s, {2 * half + 1} frames")
     curves = clip.curves.astype(np.float64)
     low, high = curves.min(axis=1, keepdims=True), curves.max(axis=1, keepdims=True)
-    # A fit swings beyond a sharp edge; no lid may open further than the capture ever had it.
+    # A fit overshoots at a sharp edge; no lid may open further than in the capture.
     return clip.replaced(curves=np.clip(_savitzky_golay(curves, half, order), low, high))
 
 
@@ -175,7 +175,7 @@ def gaussian(clip: Clip, width: float) -> Clip:
 
     Args:
         clip: any clip.
-        width: standard deviation in seconds; the weights fall off over the frames' own times.
+        width: standard deviation in seconds; the weights follow the frames' times.
 
     Raises:
         ValueError: a width that is not above 0.
@@ -187,12 +187,12 @@ def gaussian(clip: Clip, width: float) -> Clip:
 
 
 def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
-    """What a live viewer would have seen: OneEuro over the frames, one after the other.
+    """Filter like a live viewer: OneEuro over the frames, one after the other.
 
     Args:
         clip: any clip.
-        cutoff: of `OneEuro`, Hz: how much a face at rest is smoothed.
-        beta: of `OneEuro`: how quickly movement lifts the cutoff.
+        cutoff: of `OneEuro`, Hz: smoothing at rest.
+        beta: of `OneEuro`: increase of the cutoff with speed.
     """
     running = OneEuro(cutoff, beta)
     rows = [running(t, v) for t, v in zip(clip.frame_times(), clip.curves.T, strict=True)]
@@ -200,13 +200,13 @@ def one_euro(clip: Clip, cutoff: float = 1.5, beta: float = 5.0) -> Clip:
 
 
 def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
-    """Even frames at the clip's rate; where frames are missing the curves go straight across.
+    """Even frames at the clip's rate; missing frames are interpolated linearly.
 
     Args:
-        longest: seconds; across a longer gap the last value is held until a frame before its end.
+        longest: seconds; in a longer gap the last value is held until one frame before its end.
 
     Raises:
-        BudgetError: a gap so long that its frames cannot be held.
+        BudgetError: a gap with too many frames.
     """
     if clip.frame_count < 2:
         return clip
@@ -221,8 +221,8 @@ def fill_gaps(clip: Clip, longest: float | None = None) -> Clip:
 
 
 def drop_repeats(clip: Clip) -> Clip:
-    """Without frames that repeat the one before in every curve: a capture that stood still for a
-    frame because none came. The last frame stays, so that the clip keeps its length.
+    """Drop frames that repeat the frame before in every curve, because a capture repeats a frame
+    when none arrives. The last frame stays, so that the clip keeps its length.
     """
     if clip.frame_count < 3:
         return clip
@@ -233,7 +233,7 @@ def drop_repeats(clip: Clip) -> Clip:
 
 
 def mirror(clip: Clip) -> Clip:
-    """Left for right: each control takes its partner's curve, sideways angles change their sign."""
+    """Swap left and right: each control takes its partner's curve, sideways angles change sign."""
     names = [mirrored_name(name) for name in clip.names]
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)
@@ -241,7 +241,7 @@ def mirror(clip: Clip) -> Clip:
 
 
 def parse_amounts(texts: Sequence[str]) -> dict[str, float]:
-    """Patterns with amounts from texts as "jaw*=1.2".
+    """Patterns with amounts from texts such as "jaw*=1.2".
 
     Raises:
         ValueError: another form.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Values of per cent, bytes and degrees: told by their size, and brought to 0..1 and radians."""
+"""Rescales percentages, bytes and degrees to 0..1 and radians, and refuses other scales."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from .errors import AnimationFileError
 from .mapping import ANGLES, Mapping
 
 ANGLE_UNITS = ("radians", "degrees")
-# Of a control a whole movement is 1, overdriven it is 2; more is another scale.
+# A full movement is 1 and an overdriven one 2; larger values are on another scale.
 _LARGEST = 4.0
-# Radians; no head turns as far.
+# radians; no head turns further
 _LARGEST_ANGLE = 2.0
 _USUAL = (100.0, 255.0)
 
 
 def check_options(full: float | None, angles: str | None) -> None:
-    """Raises: ArgumentError: a full value that is not above 0, or angles in a strange unit."""
+    """Raises: ArgumentError: a full value that is not above 0, or an unknown unit of angles."""
     if full is not None and not 0.0 < full < 1e9:
         raise ArgumentError(f"full_value: a number above 0 was expected, found {full}")
     if angles is not None and angles not in ANGLE_UNITS:
@@ -29,12 +29,12 @@ def check_options(full: float | None, angles: str | None) -> None:
 
 
 def rescaled(clip: Clip, mapping: Mapping, full: float | None, angles: str | None) -> Clip:
-    """A file's curves as a mapping expects them: a whole movement is 1, angles are radians.
+    """A file's curves on the scale of a mapping: a full movement is 1, angles are radians.
 
     Args:
-        clip: curves of the file's own names.
-        mapping: tells which of them are angles.
-        full: value of a whole movement; None: 1.
+        clip: curves with the file's own names.
+        mapping: tells which curves are angles.
+        full: value of a full movement; None: 1.
         angles: one of ANGLE_UNITS; None: radians.
     """
     if full in (None, 1.0) and angles != "degrees":
@@ -51,16 +51,16 @@ def rescaled(clip: Clip, mapping: Mapping, full: float | None, angles: str | Non
 
 
 def refuse_other_scales(clip: Clip, name: str, full: float | None, angles: str | None) -> None:
-    """Refuse values that lie far outside the range of their control.
+    """Refuse values far outside the range of their control.
 
     Args:
         clip: curves of controls and ANGLES.
-        name: what errors call the file.
-        full: as of `rescaled`; None: nobody said it, so it is looked at.
-        angles: likewise.
+        name: the file's name in errors.
+        full: as in `rescaled`; None: not stated, so it is checked.
+        angles: as in `rescaled`; None: not stated, so it is checked.
 
     Raises:
-        AnimationFileError: a control far above 1, a head that turns farther than any.
+        AnimationFileError: a control far above 1, a head that turns too far.
     """
     said = []
     reached = np.abs(clip.curves).max(axis=1, initial=0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a file to a clip of raw controls: reading, choosing a mapping, applying it, reporting."""
+"""From a file to a clip of raw controls: reads it, chooses and applies a mapping, reports."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ KINDS = {
     "fbx": "FBX: properties, blend shapes, face boards",
 }
 ROTATIONS = ("head", "all", "none")
-# Curves that are controls of Risorius already, or that an animator set: any value is meant.
+# Curves that are Risorius' controls already, or keyed by an animator: any value is intended.
 _OWN_KINDS = ("clip", "rzc", "curves")
 
 
 class Options(NamedTuple):
-    """Of `read`."""
+    """Options of `read`."""
 
     kind: str | None
     asked: units.Asked
@@ -57,7 +57,7 @@ class Options(NamedTuple):
 
 
 class RigLike(Protocol):
-    """What a mapping of GUI controls needs of a `risorius.Rig`."""
+    """The parts of a `risorius.Rig` that a mapping of GUI controls needs."""
 
     @property
     def gui_control_names(self) -> list[str]: ...
@@ -68,16 +68,16 @@ class RigLike(Protocol):
 
 @dataclass
 class Imported:
-    """What a file holds, before any mapping.
+    """The content of a file, before any mapping.
 
     Attributes:
-        clip: curves by the file's own names, at the file's own times; time 0 is the first frame of
-            a take, and the sound's start for visemes.
+        clip: curves with the file's own names and times; time 0 is the first frame of a take, or
+            the start of the sound for visemes.
         kind: one of KINDS.
-        mapping: name of the mapping that fits: by kind, else the built-in one that knows most of
-            the names; "" if none knows any.
+        mapping: name of the fitting mapping: by kind, else the built-in one that knows most of the
+            names; "" if none knows any.
         source: the file's name.
-        notes: what the reading has to say.
+        notes: sentences about the reading.
     """
 
     clip: Clip
@@ -96,23 +96,23 @@ class Imported:
         full_value: float | None = None,
         angles: str | None = None,
     ) -> tuple[Clip, Report]:
-        """A clip of raw controls, and what became of each curve.
+        """A clip of raw controls, and the use of each curve.
 
         Args:
-            mapping: a built-in one by name, a TOML file, or a Mapping; None: the one that fits.
-            rig_names: raw controls of the rig, `Rig.raw_control_names`; others are left out and
-                reported. None: all are kept.
-            rig: for a mapping of GUI controls, whose table is the rig's.
-            rotations: "head": the head's angles, if it was captured; the eyes come as eyeLook
-                controls. "all": the eyes' angles too. "none": neither.
-            full_value: the file's value of a whole movement: 100 for per cent, 255 for bytes.
-                None: 1, and values far above it are refused.
-            angles: one of ANGLE_UNITS, of the file's angles. None: radians, and angles that no
-                head has are refused.
+            mapping: a built-in one by name, a TOML file, or a Mapping; None: the fitting one.
+            rig_names: raw controls of the rig, `Rig.raw_control_names`; other controls are dropped
+                and reported. None: all are kept.
+            rig: for a mapping of GUI controls, whose table belongs to the rig.
+            rotations: "head": the head's angles, if captured; the eyes use eyeLook controls. "all":
+                the eyes' angles too. "none": neither.
+            full_value: the file's value of a full movement: 100 for per cent, 255 for bytes. None:
+                1, and far larger values are refused.
+            angles: unit of the file's angles, one of ANGLE_UNITS. None: radians, and impossible
+                angles are refused.
 
         Raises:
-            ValueError: no mapping fits, a mapping that cannot be used, a GUI mapping without a rig,
-                values of another scale.
+            ValueError: no mapping fits, an unusable mapping, a GUI mapping without a rig, values on
+                another scale.
         """
         ranges.check_options(full_value, angles)
         if rotations not in ROTATIONS:
@@ -165,7 +165,8 @@ class Imported:
 
 
 def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
-    """Head and eye angles as asked; a head that was not captured is not held still."""
+    """Keep the requested angles of head and eyes; drop those of a head that was not captured, which
+    would hold the head still."""
     clip = done.clip
     drop = set()
     for name in clip.names:
@@ -186,7 +187,7 @@ def _without_angles(done: Mapped, rotations: str, report: Report) -> Clip:
 
 
 def _gui_to_raw(clip: Clip, rig: RigLike, report: Report) -> Clip:
-    """Raw controls of GUI curves, frame by frame through the rig's table."""
+    """Raw controls from GUI curves, frame by frame by the rig's table."""
     index = {name: i for i, name in enumerate(rig.gui_control_names)}
     gui = np.zeros((clip.frame_count, len(index)), np.float32)
     angles = [name for name in clip.names if name in ANGLES]
@@ -225,18 +226,17 @@ def read(
 
     Args:
         path: the file.
-        kind: one of KINDS, or None: told from the content, and the suffix where that says nothing.
-        rate: frames a second, of tables whose time is a frame number or is not there.
-        timecode_rate: frames a second of timecodes, where they do not tell; 29.97 and the like
+        kind: one of KINDS, or None: inferred from the content, else from the suffix.
+        rate: frames per second, for tables with frame numbers or without times.
+        timecode_rate: frames per second of timecodes, if it cannot be inferred; 29.97 and the like
             stand for 30000/1001.
-        time_unit: one of importing.TIME_UNITS, of tables and JSON whose times do not say it;
-            "rows": their times are left aside, and each row is a frame at `rate`. None: the file
-            tells.
-        take: name or number of an animation, of files that hold several; None: the first.
+        time_unit: one of importing.TIME_UNITS, for tables and JSON that do not state it; "rows":
+            times are ignored, and each row is a frame at `rate`. None: from the file.
+        take: name or number of an animation, for files with several; None: the first.
 
     Raises:
-        AnimationFileError: cannot be read or used; the sentence names file and place.
-        ValueError: an option that makes no sense.
+        AnimationFileError: the file cannot be read or used; the sentence names file and place.
+        ValueError: an invalid option.
     """
     if kind is not None and kind not in KINDS:
         raise ArgumentError(f"kind: one of {', '.join(KINDS)} was expected, found {kind!r}")
@@ -254,7 +254,7 @@ def read(
         found = _read_kind(file, data, Options(kind, asked, take, budget))
     except AnimationFileError:
         raise
-    except (ValueError, ArithmeticError) as error:  # numbers in the file that no reader expects
+    except (ValueError, ArithmeticError) as error:  # unexpected numbers in the file
         raise AnimationFileError(str(path), str(error)) from error
     except RecursionError as error:
         raise AnimationFileError(str(path), "nested too deeply to be read") from error
@@ -266,7 +266,7 @@ def read(
 
 
 def _moving(clip: Clip) -> list[str]:
-    """The curves that say something, or all."""
+    """The curves that are not constantly 0, or all."""
     moving = [n for n, curve in zip(clip.names, clip.curves, strict=True) if curve.any()]
     return moving or list(clip.names)
 
@@ -285,7 +285,7 @@ def _read_kind(file: Path, data: bytes, options: Options) -> Take:
 
 
 def _read_mouth(text: str, name: str, options: Options) -> Take | None:
-    """Mouth shapes, where a text holds such."""
+    """Mouth shapes, if the text contains them."""
     if options.kind in (None, "moho") and text.lstrip().startswith("MohoSwitch1"):
         return visemes.read_dat(text.lstrip(), name, options.asked.rate)
     is_asked = options.kind in (None, "rhubarb", "papagayo")
@@ -339,14 +339,14 @@ def import_file(
     full_value: float | None = None,
     angles: str | None = None,
 ) -> tuple[Clip, Report]:
-    """A file as a clip of raw controls, and what became of each of its curves.
+    """A file as a clip of raw controls, and the use of each of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, time_unit, take: as of `read`.
-        rig_names, mapping, rig, rotations, full_value, angles: as of `Imported.apply`.
+        path, kind, rate, timecode_rate, time_unit, take: as in `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: as in `Imported.apply`.
 
     Raises:
-        ValueError: as they do.
+        ValueError: as these do.
     """
     found = read(
         path, kind=kind, rate=rate, timecode_rate=timecode_rate, time_unit=time_unit, take=take
@@ -370,16 +370,16 @@ def import_curves(
     rig: RigLike | None = None,
     rotations: str = "head",
 ) -> tuple[Clip, Report]:
-    """Named curves as a clip of raw controls: shape keys of another rig's action.
+    """Named curves as a clip of raw controls, such as shape keys in an action of another rig.
 
     Args:
-        curves: name, as a shape key or property has it, -> (float64[keys] seconds, ascending;
-            float[keys] values). Between keys the curves go straight.
-        source: what the report names them.
-        rig_names, mapping, rig, rotations: as of `Imported.apply`.
+        curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
+            values), linear between keys.
+        source: its name in the report.
+        rig_names, mapping, rig, rotations: as in `Imported.apply`.
 
     Raises:
-        ValueError: nothing given, times that do not ascend, values that are not finite; as apply.
+        ValueError: no curves, times that do not ascend, values that are not finite; as apply.
     """
     keys = {name: _keys(name, times, values) for name, (times, values) in curves.items()}
     if not any(key.times.size for key in keys.values()):

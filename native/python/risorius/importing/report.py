@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What became of a file's curves; nothing is left out in silence."""
+"""Reports the use of every curve of a file."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ _WIDTH = 100
 @dataclass
 class Report:
     """Attributes:
-    source: the file, or what else the curves came from.
-    kind: of file, one of `importing.KINDS`.
+    source: the file, or another source of the curves.
+    kind: kind of file, one of `importing.KINDS`.
     mapping: name of the mapping used.
     mapped: curve of the source -> controls it moves.
     unmapped: curves of the source that the mapping does not know.
-    ignored: curves of the source that the mapping knows and leaves out on purpose.
-    not_in_rig: controls that the mapping gives and the rig does not have; left out.
+    ignored: curves of the source that the mapping ignores on purpose.
+    not_in_rig: controls of the mapping that the rig lacks; dropped.
     always_zero: curves of the source that are 0 in every frame.
-    bones: controls of the clip that no rig has, because bones turn by them: head and eyes.
-    absent: rows of the mapping that the source has no curve for.
-    notes: what the reading and the processing have to say.
+    bones: curves of the clip that turn bones of head and eyes instead of rig controls.
+    absent: rows of the mapping without a curve in the source.
+    notes: sentences about reading and processing.
     """
 
     source: str
@@ -38,7 +38,7 @@ class Report:
     notes: list[str] = field(default_factory=list)
 
     def lists(self) -> list[tuple[str, list[str]]]:
-        """(heading, names) of every list that is not empty, most important first."""
+        """(heading, names) of every non-empty list, most important first."""
         rows = [
             ("not mapped", self.unmapped),
             ("not in the rig", self.not_in_rig),
@@ -50,7 +50,7 @@ class Report:
         return [(heading, names) for heading, names in rows if names]
 
     def text(self) -> str:
-        """All of it for a person, in lines."""
+        """The whole report as lines of text."""
         controls = {control for row in self.mapped.values() for control in row}
         out = [
             f"{self.source}: {self.kind}, mapping {self.mapping}",
@@ -65,7 +65,7 @@ class Report:
 
 
 def _lines(text: str) -> list[str]:
-    """A long line as several; no name is parted."""
+    """Wrap a long line without splitting names."""
     return wrap(
         text, _WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Bytes and text of files, and the clip that a reader makes of its numbers."""
+"""Reads bytes and text of files, and makes clips from a reader's numbers."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from .errors import AnimationFileError
 
 Doubles = npt.NDArray[np.float64]
 
-# No recorded take is as large; a larger file is a mistake and would only fill the memory.
+# No recorded take is as large; a larger file is a mistake that would fill the memory.
 MAX_BYTES = 1 << 30
-# Times that lie further apart than this rate gives are times of keys, not of frames.
+# Times with larger steps than this rate are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
-# Of frames whose time goes back or stands still, the share that a take may lose.
+# Share of frames that a take may lose because their time does not ascend.
 MOST_LOST = 1.0 / 3.0
 RATES = (12.0, 23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
 
 
 @dataclass
 class Take:
-    """What a reader found: curves of the file's own names, and what is to be said of the reading.
+    """The result of a reader: curves with the file's own names, and notes on the reading.
 
     Attributes:
-        clip: names as the file spells them, times as the file gives them.
+        clip: names and times as in the file.
         kind: one of `importing.KINDS`.
-        mapping: the built-in mapping that fits this kind, or "" where the names decide.
-        notes: sentences; what was left out, filled or assumed.
+        mapping: the built-in mapping of this kind, or "" if the names decide.
+        notes: sentences about dropped, filled or assumed data.
     """
 
     clip: Clip
@@ -50,8 +50,8 @@ def read_bytes(path: Path, *, found: bool = False) -> bytes:
     """The bytes of a file.
 
     Args:
-        path: of the file.
-        found: another file names it, and nobody typed it: it may be no pipe.
+        path: path of the file.
+        found: another file names it, so that it may not be a pipe.
 
     Raises:
         AnimationFileError: missing, unreadable, empty, larger than MAX_BYTES, a device.
@@ -68,11 +68,11 @@ def read_bytes(path: Path, *, found: bool = False) -> bytes:
 
 
 def refuse_other_kinds(data: bytes, name: str) -> None:
-    """Say what a file is that is no animation, where its first bytes tell.
+    """Raise an error that names the kind of a file if its first bytes show that it is no animation.
 
     Args:
         data: the file, or its first bytes.
-        name: what errors call the file.
+        name: the file's name in errors.
 
     Raises:
         AnimationFileError: a sound, a picture, an archive, a document, a scene, a face ...
@@ -87,10 +87,10 @@ def decode(data: bytes, name: str) -> str:
 
     Args:
         data: the whole file.
-        name: what errors call the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: another encoding, with the line and column of the first bad byte.
+        AnimationFileError: another encoding, with line and column of the first bad byte.
     """
     encoding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
@@ -106,15 +106,15 @@ def decode(data: bytes, name: str) -> str:
 
 
 def frame_rate(times: Doubles) -> float:
-    """Frames per second of frame times: a usual rate if one is within 1 %, else as measured; of
-    keys that lie far apart USUAL_RATE."""
+    """Frames per second of frame times: a usual rate if one is within 1 %, else the measured one;
+    USUAL_RATE for keys that lie far apart."""
     if times.size < 2:
         return USUAL_RATE
     step = float(np.median(np.diff(times)))
     measured = 1.0 / step if step > 0.0 else USUAL_RATE
     if measured < LEAST_RATE:
         return USUAL_RATE
-    # The nearest rate is tried first: 29.97 and 30 lie within 1 % of each other.
+    # The nearest rate is tried first, because 29.97 and 30 are within 1 % of each other.
     near = min(RATES, key=lambda rate: abs(rate - measured))
     if abs(near - measured) > 0.01 * near:
         return measured
@@ -132,17 +132,17 @@ def make_clip(
     events: Sequence[Event] = (),
     metadata: Mapping[str, str] | None = None,
 ) -> Clip:
-    """A clip that is evenly timed where its times are even.
+    """A clip with even timing if its times are even.
 
-    Even means that no frame is further than a microsecond from start + i / rate.
+    They are even if no frame is further than a microsecond from start + i / rate.
 
     Args:
-        names: of the curves, each once.
+        names: names of the curves, each once.
         curves: float[controls, frames].
         times: float64[frames], seconds, ascending.
-        rate: frames a second; None: told from the times.
-        events: of the clip.
-        metadata: of the clip.
+        rate: frames per second; None: inferred from the times.
+        events: events of the clip.
+        metadata: metadata of the clip.
     """
     chosen = rate or frame_rate(times)
     start = float(times[0]) if times.size else 0.0
@@ -164,15 +164,15 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
 
     Args:
         text: the cell.
-        name: what errors call the file.
+        name: the file's name in errors.
         line: from 1, for errors.
-        column: from 1, or what heads it, for errors.
+        column: from 1, or its header, for errors.
 
     Raises:
-        AnimationFileError: no number, NaN, infinite or outside float32.
+        AnimationFileError: not a number, NaN, infinite or outside float32.
     """
     try:
-        value = float(text.replace("_", "?"))  # Python's 1_000 is no number elsewhere
+        value = float(text.replace("_", "?"))  # 1_000 is a number only in Python
     except ValueError:
         found = text if len(text) <= 40 else text[:40] + "..."
         raise AnimationFileError(
@@ -186,12 +186,12 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
 
 
 def keep_ascending(times: Doubles, notes: list[str], name: str) -> npt.NDArray[np.intp]:
-    """Indices of the frames whose time comes after all times before; the others are noted.
+    """Indices of the frames whose time is later than all times before; the others are noted.
 
     Args:
         times: float64[frames], seconds.
-        notes: gets a sentence where frames are left out.
-        name: what errors call the file.
+        notes: receives a sentence if frames are dropped.
+        name: the file's name in errors.
 
     Returns:
         int[kept frames].

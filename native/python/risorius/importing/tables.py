@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Comma separated tables: Live Link Face takes, and curves by column of any software."""
+"""Reads delimited tables: Live Link Face takes, and curves by column of any software."""
 
 from __future__ import annotations
 
@@ -33,31 +33,31 @@ Doubles = npt.NDArray[np.float64]
 DELIMITERS = (",", "\t", ";", "|")
 COMMENTS = ("#", "//", "%")
 _NAMED_DELIMITER = re.compile(r"sep=(.|\\t)", re.IGNORECASE)
-# What stands in a cell whose value is not there.
+# Cells that mean a missing value.
 _MISSING = frozenset(("", "-", "--", "\N{EN DASH}", "na", "n/a", "#n/a", "null", "none"))
-# Curves of a take of Live Link Face, in their order.
+# Curves of a Live Link Face take, in their order.
 LIVE_LINK_FACE = (
     *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
     *"HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll".split(),
     *"RightEyeYaw RightEyePitch RightEyeRoll".split(),
 )
-# Columns that tell how many blend shapes there are; they hold no curve.
+# Columns that count blend shapes and hold no curve.
 COUNTS = ("blendshapecount",)
 _FILE_TELLS = Asked()
-_SPARSEST = 4  # cells of a table by curve for each row of one by time and name
-_HOLES_BY_NAME = 3  # curves with holes that notes name each
+_SPARSEST = 4  # largest ratio of cells of a table by curve to rows of a table by time and name
+_HOLES_BY_NAME = 3  # number of curves with missing values that notes name individually
 
 
 @dataclass
 class Table:
-    """A table's cells as text; every row as long as the header.
+    """The cells of a table as text; every row is as long as the header.
 
     Attributes:
-        header: names of the columns, without blanks around them.
+        header: names of the columns, stripped.
         rows: the other rows.
         lines: line of the file, from 1, at which each row ends.
-        delimiter: what stands between cells.
-        notes: what was left out of the table.
+        delimiter: character between cells.
+        notes: sentences about dropped parts.
     """
 
     name: str
@@ -79,21 +79,22 @@ class Table:
         """
         text = self.rows[row][column].strip()
         if "." not in text and (self.delimiter != "," or not self.has_points):
-            text = text.replace(",", ".")  # a decimal comma, as spreadsheets of many lands write
+            # a decimal comma, as spreadsheets of many countries write.
+            text = text.replace(",", ".")
         return number(text, self.name, self.lines[row], self.place(column))
 
     @cached_property
     def has_points(self) -> bool:
-        """Whether numbers have decimal points: then a comma inside a cell is no decimal one."""
+        """Whether numbers have decimal points; then a comma in a cell is not a decimal comma."""
         return any(re.fullmatch(r"\s*[-+]?\d*\.\d+\s*", c) for row in self.rows for c in row)
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
-        """The cells by column, once the rows are known to be of one length."""
+        """The cells by column; call it after the check of row lengths."""
         return list(zip(*self.rows, strict=True))
 
     def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
-        """float64[rows] of a column, all or some. Raises: as cell."""
+        """float64[rows] of a column, all rows or some. Raises: as cell."""
         values = self.whole_column(column) if rows is None else None
         if values is None:
             wanted = range(len(self.rows)) if rows is None else rows
@@ -101,7 +102,7 @@ class Table:
         return values
 
     def whole_column(self, column: int) -> Doubles | None:
-        """float64[rows] of a column at once; None where a cell is no plain number."""
+        """float64[rows] of a whole column; None if a cell is not a plain number."""
         cells = self.columns[column]
         try:
             values = np.array(list(map(float, cells)))
@@ -116,28 +117,29 @@ class Table:
 
 
 def sniff(line: str) -> str:
-    """The delimiter: the sign that parts a header into most cells outside quotes."""
+    """The delimiter: the character that splits a header into most cells, ignoring quotes."""
     return max(DELIMITERS, key=re.sub(r'"[^"]*"', '""', line).count)
 
 
 def read_table(text: str, name: str) -> Table:
     """A table with a header.
 
-    Comments are passed over, and a line "sep=;" says the delimiter, as Excel writes and reads it.
+    Comments are skipped. A line "sep=;" sets the delimiter, as in Excel.
 
     Args:
-        text: of the file; commas, semicolons or tabs stand between the cells.
-        name: what errors call the file.
+        text: content of the file, with commas, semicolons or tabs between cells.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: no header, a name twice, a row of another length, no row, bad quotes.
+        AnimationFileError: no header, a repeated name, a row of another length, no rows, bad
+            quotes.
     """
     if "\0" in text:
         line = text[: text.index("\0")].count("\n") + 1
         raise AnimationFileError(name, "text was expected, found a zero byte", line=line)
     content, delimiter, comment = _without_comments(re.split(r"\r\n|\n|\r", text))
     delimiter = delimiter or sniff(next((line for line in content if line.strip()), ""))
-    # strict: a quote that is never closed would swallow the rest of the file
+    # strict, because an unclosed quote would swallow the rest of the file
     reader = csv.reader(content, delimiter=delimiter, strict=True)
     rows: list[list[str]] = []
     lines: list[int] = []
@@ -161,7 +163,8 @@ def read_table(text: str, name: str) -> Table:
 
 
 def _without_comments(lines: list[str]) -> tuple[list[str], str, str]:
-    """Lines of which comments are empty; the delimiter that one names, the last one at the top."""
+    """The lines with comments emptied, the delimiter that one states, and the last comment at the
+    top."""
     delimiter = comment = ""
     is_top = True
     for i, line in enumerate(lines):
@@ -184,7 +187,7 @@ def _check(table: Table, line: int) -> None:
             "a header with the names of the curves was expected, found numbers",
             line=line,
         )
-    # A header that ends in a delimiter has one more empty column; its rows may have it or not.
+    # A header that ends in a delimiter has one more empty column; its rows may lack it.
     if len(table.header) > 1 and not table.header[-1]:
         table.header.pop()
         for row in table.rows:
@@ -201,7 +204,7 @@ def _check(table: Table, line: int) -> None:
             )
         seen[header] = column
     if len(table.rows) > 1 and len(table.rows[-1]) < len(table.header):
-        # A program that was ended while it wrote; the last number may be cut too.
+        # The program ended while it wrote; the last number may be cut too.
         table.notes.append(f"the last row (line {table.lines[-1]}) is cut short and left out")
         del table.rows[-1], table.lines[-1]
     for row, at in zip(table.rows, table.lines, strict=True):
@@ -228,10 +231,10 @@ def _is_missing(cell: str) -> bool:
 
 
 def _with_times(table: Table, at: int, asked: Asked) -> Table:
-    """The rows that have a time, or all if rows are counted.
+    """The rows that have a time, or all rows if rows are counted.
 
     Raises:
-        AnimationFileError: more than MOST_LOST of the rows have none.
+        AnimationFileError: more than MOST_LOST of the rows have no time.
     """
     keep = [i for i, row in enumerate(table.rows) if not _is_missing(row[at])]
     lost = len(table.rows) - len(keep)
@@ -252,20 +255,20 @@ def _with_times(table: Table, at: int, asked: Asked) -> Table:
 
 
 def is_live_link_face(header: Sequence[str]) -> bool:
-    """A timecode, the count of shapes, then shapes: what Live Link Face and its likes write."""
+    """Whether a header is a timecode, the count of shapes, then shapes, as in Live Link Face."""
     names = [plain(cell) for cell in header]
     return len(names) > 2 and names[0] == "timecode" and names[1] in COUNTS
 
 
 def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
-    """A take of Live Link Face: time from the timecode and its rate, not from the row.
+    """A take of Live Link Face: times from the timecode and its rate, not from the row number.
 
     Args:
         table: 2 columns and 51 to 61 curves, in any order, in either style of names.
-        asked: what the caller says of its timecodes.
+        asked: the caller's options on timecodes.
 
     Raises:
-        AnimationFileError: a cell that is none, timecodes whose rate cannot be told.
+        AnimationFileError: an invalid cell, timecodes without a recognisable rate.
     """
     table = _with_times(table, 0, asked)
     notes = list(table.notes)
@@ -286,7 +289,7 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
-    """Seconds of the timecodes in a column, or of its rows where those are to be counted."""
+    """Seconds of the timecodes in a column, or of row numbers if rows are counted."""
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)
     codes = [
@@ -331,7 +334,7 @@ def _note_count(table: Table, found: int, notes: list[str]) -> None:
 
 
 def _note_dropped(times: Doubles, notes: list[str]) -> None:
-    """Rows that were not written, as a phone under load does."""
+    """Note rows that are missing, as from a phone under load."""
     if times.size < 3:
         return
     steps = np.diff(times)
@@ -348,17 +351,17 @@ def _note_dropped(times: Doubles, notes: list[str]) -> None:
 def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
     """Curves by column.
 
-    Time is the column that is headed so (in a unit of `clock.units`, timecodes, or frame numbers at
-    the rate that is asked for), else the row number at that rate. An empty cell is a value that is
-    not there: the curve goes straight across, or keeps its first or last value.
+    The time is the column with such a header (in a unit of `clock.units`, timecodes, or frame
+    numbers at the caller's rate), else the row number at that rate. An empty cell is a missing
+    value: the curve is interpolated linearly, or keeps its first or last value.
 
     Args:
-        table: of `read_table`.
-        asked: what the caller says of its time.
+        table: from `read_table`.
+        asked: the caller's options on time.
 
     Raises:
-        AnimationFileError: no time and no rate, a cell that is no number, no curve, a unit of time
-            that nobody knows.
+        AnimationFileError: neither times nor a rate, a cell that is not a number, no curve, an
+            unknown unit of time.
     """
     at = _time_column(table)
     if at is not None:
@@ -382,7 +385,7 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _time_column(table: Table) -> int | None:
-    """The first column of the best kind: a time before a frame number."""
+    """The column of the times, preferably a time rather than a frame number."""
     found = [(i, name) for i, h in enumerate(table.header) if (name := time_name(h)) is not None]
     found.sort(key=lambda row: row[1].unit == FRAMES)
     return found[0][0] if found else None
@@ -401,7 +404,7 @@ def _plain_times(table: Table, at: int | None, asked: Asked, notes: list[str]) -
 
 
 def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
-    """Not a row number, a count, a second time, or a column of text."""
+    """Whether a column holds a curve: not a row number, a count, a second time, or text."""
     header = plain(table.header[column])
     if header in COUNTS or time_name(table.header[column]) is not None:
         return False
@@ -418,14 +421,14 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
 
 
 def _by_curve(table: Table, at: int) -> tuple[Table, int]:
-    """A table with a row for each time and name as one with a column for each name; else as it is.
+    """A table with a row for each time and name becomes one with a column for each name.
 
     Args:
-        table: its columns a time, a name and a value, as MediaPipe's results are often kept.
+        table: its columns are a time, a name and a value, as MediaPipe's results often have.
         at: the column of the time.
 
     Returns:
-        A table and its column of the time.
+        The table, converted if it has this form, and its column of the time.
 
     Raises:
         AnimationFileError: most names have no value at most times.
@@ -456,7 +459,7 @@ def _by_curve(table: Table, at: int) -> tuple[Table, int]:
 
 
 def _shapes(table: Table, at: int | None) -> int | None:
-    """The one column that holds nothing but mouth shapes of Rhubarb's, or None."""
+    """The only column that holds nothing but Rhubarb's mouth shapes, or None."""
     found = [
         i
         for i in range(len(table.header))
@@ -466,7 +469,7 @@ def _shapes(table: Table, at: int | None) -> int | None:
 
 
 def _curves(table: Table, columns: Sequence[int], times: Doubles, notes: list[str]) -> Doubles:
-    """float64[columns, rows]; cells without a value are filled from the rows around them."""
+    """float64[columns, rows]; missing values are filled from the rows around them."""
     holes: list[tuple[str, int]] = []
     curves = np.array([_column(table, column, times, holes) for column in columns])
     if len(holes) > _HOLES_BY_NAME:
@@ -487,6 +490,6 @@ def _column(table: Table, column: int, times: Doubles, holes: list[tuple[str, in
     if filled.all():
         return values  # decimal commas
     holes.append((table.header[column], int((~filled).sum())))
-    # A clock that runs back would lead the curve astray; the frames it loses are left out later.
+    # A clock that runs back would distort the curve; its frames are dropped later.
     at = np.maximum.accumulate(times)
     return np.interp(at, at[known], values)

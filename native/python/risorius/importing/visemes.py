@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viseme tracks of lip sync tools, as curves that flow into each other instead of steps."""
+"""Viseme tracks of lip sync tools, as smooth curves instead of steps."""
 
 from __future__ import annotations
 
@@ -21,29 +21,30 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames a second of the curves; the cues themselves are timed to a hundredth or a frame.
+# Frames per second of the curves; cues are timed to a hundredth of a second or a frame.
 RATE = 60.0
-# Seconds that a mouth takes from one shape to the next.
+# Seconds in which a mouth changes from one shape to the next.
 BLEND = 0.12
-# Moho and Papagayo count frames of a film; a .dat does not say how many a second.
+# Moho and Papagayo count frames of a film; a .dat file does not state its rate.
 DAT_RATE = 24.0
-# Seconds; a file that is longer has a wrong number in it.
+# seconds; a longer file has a wrong number
 LONGEST = 7200.0
-# A mouth that never closes for an M shows at once; that a D was cut short nobody sees. 1: held back
-# for no neighbour; 0: neighbours may reach all through it.
+# A mouth that never closes for an M is noticed, a shortened D is not. 1: neighbours do not reach
+# beyond the middle of the shape; 0: they may reach through all of it.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
     "rest": 0.3,
 }  # fmt: skip
 RHUBARB = frozenset("ABCDEFGHX")
-# Names that only Papagayo's ten mouth shapes have tell its files from Rhubarb's; E is in both.
+# Names that only Papagayo's ten mouth shapes have, which distinguish its files from Rhubarb's; E is
+# in both.
 PAPAGAYO = frozenset(("AI", "E", "etc", "FV", "L", "MBP", "O", "rest", "U", "WQ"))
 _TSV = re.compile(r"\s*(-?\d+(?:[.,]\d+)?)(?:\s+|\s*[;,|]\s*)([A-HXa-hx])\s*")
 
 
 class Cue(NamedTuple):
-    """A mouth shape from `start` to `end`, seconds."""
+    """A mouth shape from `start` to `end`, in seconds."""
 
     start: float
     end: float
@@ -53,15 +54,15 @@ class Cue(NamedTuple):
 def flowing_curves(
     cues: Sequence[Cue], times: Doubles, blend: float = BLEND
 ) -> tuple[list[str], Doubles]:
-    """How much of each shape the mouth has: weights that add up to 1 in every frame.
+    """The weight of each shape; weights add up to 1 in every frame.
 
-    At the border of two cues one goes over into the other along half a cosine, `blend` seconds
-    long and with the border in its middle, but no longer than the cues allow: it may reach into a
-    cue to its middle if that is dominant, and up to its other end if it is weak. So a dominant cue
-    is a whole 1 in its middle, and a short weak one between two others never comes to full weight.
+    At the border of two cues one blends into the other along half a cosine, `blend` seconds long
+    and centred on the border, but shorter if the cues demand it: a transition may reach to the
+    middle of a dominant cue, and to the far end of a weak one. A dominant cue therefore has weight
+    1 in its middle, and a short weak one between two others never reaches full weight.
 
     Args:
-        cues: by time, each ending where the next starts.
+        cues: by time; each ends where the next starts.
         times: float64[frames], seconds, ascending.
         blend: seconds.
 
@@ -78,7 +79,7 @@ def flowing_curves(
     for i in range(1, len(cues)):
         border = cues[i].start
         half = min(0.5 * blend, reach[i - 1], reach[i])
-        # A window ends with the next cue at the latest; the borders of later cues follow in turn.
+        # A window ends with the next cue at the latest; borders of later cues follow in turn.
         beyond = cues[i + 1].end if i + 1 < len(cues) else np.inf
         first, last = np.searchsorted(times, [border - half, beyond])
         at = times[first:last]
@@ -92,10 +93,10 @@ def flowing_curves(
 def _take(
     cues: list[Cue], kind: str, name: str, notes: list[str], events: Sequence[Event] = ()
 ) -> Take:
-    """A take of cues: curves at RATE, the cues themselves as events.
+    """A take from cues: curves at RATE, and the cues themselves as events.
 
     Raises:
-        AnimationFileError: no cue of any length. BudgetError: too many shapes for so long a track.
+        AnimationFileError: no cue has a length. BudgetError: too many shapes for such a long track.
     """
     cues = [cue for cue in cues if cue.end > cue.start]
     if not cues:
@@ -117,7 +118,7 @@ def _take(
 
 
 def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> list[Cue]:
-    """Cues of start times, each lasting to the next; a rest before the first."""
+    """Cues from start times, each lasting until the next; a rest before the first."""
     out = [Cue(0.0, starts[0][0], rest)] if starts and starts[0][0] > 0.0 else []
     ends = [start for start, _ in starts[1:]] + [end]
     out += [Cue(start, stop, shape) for (start, shape), stop in zip(starts, ends, strict=True)]
@@ -125,23 +126,23 @@ def _from_starts(starts: Sequence[tuple[float, str]], end: float, rest: str) -> 
 
 
 def is_rhubarb_tsv(text: str) -> bool:
-    """Lines of a time and a shape of Rhubarb's, at least half of all; the others are mistakes."""
+    """Whether at least half of the lines are a time and a shape of Rhubarb's."""
     lines = [line for line in re.split(r"\r\n|\n|\r", text) if line.strip()]
     hits = sum(_TSV.fullmatch(line) is not None for line in lines)
     return bool(lines) and lines[0].strip()[:1].isdigit() and 2 * hits >= len(lines)
 
 
 def read_rhubarb_tsv(text: str, name: str) -> Take:
-    """Rhubarb's lines "0.32<tab>B", seconds and a shape; the last one tells the end.
+    """Rhubarb's lines "0.32<tab>B", seconds and a shape; the last line marks the end.
 
-    Small letters, blanks, decimal commas and another sign than the tab are forgiven.
+    Accepts lower case, blanks, decimal commas and other separators than the tab.
 
     Args:
-        text: of the file.
-        name: what errors call the file.
+        text: content of the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: a line of another form, times that do not ascend.
+        AnimationFileError: an invalid line, times that do not ascend.
     """
     starts: list[tuple[float, str]] = []
     for line, row in enumerate(re.split(r"\r\n|\n|\r", text), start=1):
@@ -160,12 +161,12 @@ def read_rhubarb_tsv(text: str, name: str) -> Take:
 
 
 def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
-    """Shapes of Rhubarb's in one column of a table.
+    """Rhubarb's shapes in one column of a table.
 
     Args:
         times: float64[rows], seconds.
-        shapes: of each row, from its time on; the last one tells the end.
-        name: what errors call the file.
+        shapes: shapes of each row, from its time on; the last one marks the end.
+        name: the file's name in errors.
 
     Raises:
         AnimationFileError: times that do not ascend, fewer than two rows.
@@ -199,11 +200,11 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
     """Rhubarb's <rhubarbResult> with <mouthCue start end>, in seconds.
 
     Args:
-        text: of the file.
-        name: what errors call the file.
+        text: content of the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: no such XML, or XML with declarations of its own.
+        AnimationFileError: not such XML, or XML with declarations of its own.
     """
     text = re.sub(r"^\s*<\?xml.*?\?>", "", text, flags=re.DOTALL)
     try:
@@ -229,10 +230,10 @@ def read_rhubarb_xml(text: str, name: str) -> Take:
 
 
 def _refuse_declarations(text: str, name: str) -> None:
-    """Read through with nothing but a look for a document type, which may hold entities that grow.
+    """Scan for a document type, which could define growing entities.
 
     Raises:
-        AnimationFileError: there is one. ExpatError: no XML.
+        AnimationFileError: there is one. ExpatError: not XML.
     """
 
     def refuse(*_: object) -> None:
@@ -251,10 +252,10 @@ def read_rhubarb_json(document: dict[str, object], name: str) -> Take:
 
     Args:
         document: parsed JSON.
-        name: what errors call the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: cues of another form.
+        AnimationFileError: cues in another form.
     """
     rows = document.get("mouthCues")
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
@@ -290,15 +291,15 @@ def _rhubarb_cues(rows: Sequence[tuple[str, str, str]], name: str) -> Take:
 
 
 def read_dat(text: str, name: str, rate: float | None = None) -> Take:
-    """Moho's switch data: MohoSwitch1, then lines of a frame, counted from 1, and a shape.
+    """Moho's switch data: MohoSwitch1, then lines with a frame, counted from 1, and a shape.
 
     Args:
-        text: of the file.
-        name: what errors call the file.
-        rate: frames a second; None: what an FPS line says, else DAT_RATE, noted.
+        text: content of the file.
+        name: the file's name in errors.
+        rate: frames per second; None: from an FPS line, else DAT_RATE with a note.
 
     Raises:
-        AnimationFileError: a line of another form, frames that do not ascend.
+        AnimationFileError: an invalid line, frames that do not ascend.
     """
     lines = re.split(r"\r\n|\n|\r", text)
     notes: list[str] = []
@@ -333,7 +334,7 @@ def read_dat(text: str, name: str, rate: float | None = None) -> Take:
 
 
 class Lines:
-    """The lines of a .pgo, one after the other."""
+    """The lines of a .pgo file, one after the other."""
 
     def __init__(self, text: str, name: str) -> None:
         self.rows = re.split(r"\r\n|\n|\r", text.rstrip("\r\n"))
@@ -350,14 +351,14 @@ class Lines:
         return AnimationFileError(self.name, message, line=self.at)
 
     def count(self, text: str, what: str) -> int:
-        """The whole number of up to nine digits that a line holds; it may be negative.
+        """The integer of up to nine digits in a line; it may be negative.
 
         Args:
             text: the line.
-            what: the number stands for, for errors.
+            what: the meaning of the number, for errors.
 
         Raises:
-            AnimationFileError: the line holds something else.
+            AnimationFileError: another content.
         """
         if not re.fullmatch(r"-?\d{1,9}", text):
             raise self.fail(f"{what} was expected, found {text[:40]!r}")
@@ -365,7 +366,7 @@ class Lines:
 
 
 class Word(NamedTuple):
-    """A word of Papagayo: frames from 0, the last one included."""
+    """A word of Papagayo: frames from 0, the last one inclusive."""
 
     text: str
     start: int
@@ -374,14 +375,14 @@ class Word(NamedTuple):
 
 
 def read_pgo(text: str, name: str) -> Take:
-    """Papagayo's own file, as text: voices of phrases of words of phonemes.
+    """Papagayo's text file: voices with phrases with words with phonemes.
 
     Args:
-        text: of the file.
-        name: what errors call the file.
+        text: content of the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: a line of another form, or too few.
+        AnimationFileError: an invalid line, or too few lines.
     """
     lines = Lines(text, name)
     lines.next()
@@ -419,14 +420,14 @@ def _pgo_word(lines: Lines) -> Word:
 
 
 def read_pgo_json(document: dict[str, object], name: str) -> Take:
-    """Papagayo-NG's own file of version 2.
+    """A file of Papagayo-NG, version 2.
 
     Args:
         document: parsed JSON.
-        name: what errors call the file.
+        name: the file's name in errors.
 
     Raises:
-        AnimationFileError: tables of another form.
+        AnimationFileError: tables in another form.
     """
     try:
         voices = [
@@ -450,7 +451,7 @@ def read_pgo_json(document: dict[str, object], name: str) -> Take:
 
 
 def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: str) -> Take:
-    """The first voice that speaks; between words the mouth rests."""
+    """The first voice that speaks; the mouth rests between words."""
     if not 0.0 < rate < 1e4:
         raise AnimationFileError(name, f"frames a second above 0 were expected, found {rate:g}")
     speaking = [(voice, words) for voice, words in voices if any(w.phonemes for w in words)]
@@ -477,18 +478,18 @@ def _from_voices(voices: Sequence[tuple[str, list[Word]]], rate: float, name: st
 
 
 def reader_of(text: str, kind: str | None) -> Callable[[str, str], Take] | None:
-    """What reads a text that is neither JSON nor a table, or None.
+    """The reader for a text that is neither JSON nor a table, or None.
 
     Args:
-        text: of the file.
-        kind: one of `importing.KINDS` that the caller says it is, or None.
+        text: content of the file.
+        kind: one of `importing.KINDS` from the caller, or None.
     """
     head = text.lstrip()[:200]
     if head.startswith("<"):
         return read_rhubarb_xml
     if head.startswith("lipsync version"):
         return read_pgo
-    # Whoever says that it is Rhubarb's is told which line is not; a header makes it a table.
+    # If the caller says rhubarb, the error names the invalid line; a header makes the text a table.
     if is_rhubarb_tsv(text) or (kind == "rhubarb" and head[:1].isdigit()):
         return read_rhubarb_tsv
     return None

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Clips as text that other software reads, and that reads back to the same bits; mappings as text
-with rows of one's own."""
+"""Writes clips as text that other software reads and that gives the same bits again; and mappings
+with a user's rows."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from .mapping import load_mapping, mapping_names
 def csv_text(clip: Clip) -> str:
     """A table: time in seconds, then a column for each control; lines end in LF.
 
-    Every number has as many digits as its float32 (the time: float64) needs to come back.
+    Every number has enough digits to restore its float32 (the time: float64).
 
     Raises:
-        ValueError: a value that is not finite, which other software would stumble over.
+        ValueError: a value that is not finite, which other software may not accept.
     """
     _check_finite(clip, "CSV")
     out = io.StringIO()
@@ -38,7 +38,7 @@ def csv_text(clip: Clip) -> str:
 
 
 def json_text(clip: Clip) -> str:
-    """All of a clip: rate, times, curves by name, events, metadata.
+    """The whole clip: rate, times, curves by name, events, metadata.
 
     Raises:
         ValueError: a value that is not finite.
@@ -53,7 +53,7 @@ def json_text(clip: Clip) -> str:
         "events": [event._asdict() for event in clip.events],
         "metadata": clip.metadata,
     }
-    # json writes floats with all of a double's digits; a float32 needs fewer.
+    # json writes all digits of a double; a float32 needs fewer.
     rows = [
         f"{json.dumps(name)}: [{', '.join(map(_shortest, curve))}]"
         for name, curve in zip(clip.names, clip.curves, strict=True)
@@ -63,20 +63,20 @@ def json_text(clip: Clip) -> str:
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a file whole or not at all.
+    """Write a text file atomically.
 
     Args:
         text: the new content, written as UTF-8.
-        path: of the file; a link is followed.
+        path: path of the file; links are followed.
 
     Raises:
-        OSError: the file cannot be written; what was there before stays.
+        OSError: the file cannot be written; the old content stays.
     """
     fileio.write_text(path, text)
 
 
 def _shortest(value: np.float32) -> str:
-    return str(value)  # NumPy writes the fewest digits that give the same float32
+    return str(value)  # NumPy writes the fewest digits that restore the float32
 
 
 def _check_finite(clip: Clip, kind: str) -> None:
@@ -87,18 +87,18 @@ def _check_finite(clip: Clip, kind: str) -> None:
 
 
 def mapping_with(base: str, rows: Mapping[str, Mapping[str, float]]) -> str:
-    """The TOML of a mapping with further rows, as load_mapping reads it.
+    """The TOML of a mapping with additional rows, for load_mapping.
 
     Args:
-        base: name of a mapping that comes with Risorius, path of another, or "" for none. Comments
-            of a file are left behind.
-        rows: curve -> {control, or @expression: weight}; an empty row leaves the curve out.
+        base: name of a built-in mapping, path of another, or "" for none. Comments of a file are
+            lost.
+        rows: curve -> {control, or @expression: weight}; an empty row ignores the curve.
 
     Raises:
         MappingError: a base that cannot be read. TomlError.
     """
     if base:
-        load_mapping(base)  # says what is wrong with it
+        load_mapping(base)  # raises the error if it is invalid
     table: dict[str, Any] = {"base": base} if base in ("", *mapping_names()) else toml.read(base)
     ignored = [*table.get("ignore", ()), *(name for name, row in rows.items() if not row)]
     table["ignore"] = [name for name in dict.fromkeys(ignored) if not rows.get(name)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finished faces with fewer joints, correctives and levels of detail."""
+"""Reduces joints, correctives and levels of detail of finished faces."""
 
 from .lighten import ExpressionError, LightenReport, Size, lighten
 

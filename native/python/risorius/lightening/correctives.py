@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which correctives a face can do without: those that move its vertices least."""
+"""Selects the correctives that a face can lose: those that move its vertices least."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..base.words import counted
 from .poses import Pose, motions_at
 
 _AT_ONCE = 1 << 15  # joints that are posed at once
-_LOOKED_AT = 6000  # vertices that are enough to tell correctives apart
+_LOOKED_AT = 6000  # number of vertices that is enough to rank correctives
 
 
 def needed_correctives(dna: Dna) -> set[int]:
-    """Rows of correctives, from 0, that networks, poses of solvers, twists or maps read."""
+    """Rows of correctives, from 0, that networks, solvers' poses, twists or maps read."""
     raw = len(dna.raw_control_names)
     read: list[object] = [dna.animated_maps.conditionals.input_indices]
     read += [n.input_indices for n in dna.machine_learned_behavior.neural_networks]
@@ -40,13 +40,13 @@ def needed_correctives(dna: Dna) -> set[int]:
 
 
 def contributions(dna: Dna, rig: Rig, poses: Sequence[Pose]) -> Doubles:
-    """float64[correctives]: root of the summed squares of the ways that each adds to the vertices
-    of the finest level, with all of its controls at 1, in the file's unit.
+    """float64[correctives]: root of the summed squared displacements that each corrective adds to
+    the vertices of the finest level, with all of its controls at 1, in the file's unit.
 
     Args:
         dna: the face.
         rig: compiled from it.
-        poses: those of correctives among poses_of; one without has no pose and counts 0.
+        poses: poses of poses_of; a corrective without a pose counts 0.
     """
     out = np.zeros(dna.psd_count)
     mine = [pose for pose in poses if pose.input >= len(dna.raw_control_names)]
@@ -76,14 +76,14 @@ def contributions(dna: Dna, rig: Rig, poses: Sequence[Pose]) -> Doubles:
 
 
 def middle_of(dna: Dna) -> Doubles:
-    """float64[3]: the middle of the box about all meshes."""
+    """float64[3]: the middle of the bounding box of all meshes."""
     points = [np.asarray(mesh.positions, np.float64) for mesh in dna.meshes]
     whole = np.concatenate([*points, np.zeros((0, 3))])
     return (whole.min(axis=0) + whole.max(axis=0)) / 2 if len(whole) else np.zeros(3)
 
 
 class _Spread:
-    """How far joints and shapes of a mesh bring its vertices."""
+    """The displacements of a mesh's vertices by its joints and shapes."""
 
     def __init__(self, dna: Dna, mesh: Mesh, middle: Doubles, step: int) -> None:
         points = np.asarray(mesh.positions, np.float64)[::step] - middle
@@ -93,7 +93,7 @@ class _Spread:
         self.shapes = {column: shape[::step] for column, shape in shapes.items()}
 
     def squares(self, motions: Doubles, inputs: Doubles, values: Doubles) -> Doubles:
-        """float64[n]: summed squares of the ways of each motion and its shape."""
+        """float64[n]: summed squared displacements of each motion and its shape."""
         out = np.zeros(len(motions))
         for at, motion in enumerate(motions):
             way = self.skin.moved(motion + np.eye(3, 4))
@@ -105,16 +105,16 @@ class _Spread:
 
 
 def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int]:
-    """Rows of the correctives that leave, from 0, those that move least first; none of which
-    another one that stays is made of.
+    """Rows of the correctives to remove, from 0, in the order of their contribution. A corrective
+    that a remaining one is made of is never removed.
 
     Args:
         dna: the face.
-        leaving: how many are to.
+        leaving: number of correctives to remove.
         contribution: float64[correctives].
 
     Raises:
-        ArgumentError: fewer would stay than others read.
+        ArgumentError: correctives that others read would have to be removed.
     """
     raw = len(dna.raw_control_names)
     readers: dict[int, set[int]] = {}
@@ -124,7 +124,7 @@ def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int
     needed, out = needed_correctives(dna), set[int]()
     order = [int(row) for row in np.argsort(contribution, kind="stable") if row not in needed]
     while len(out) < leaving:
-        # What others are made of is free once these are gone.
+        # A corrective becomes removable when all of its readers are removed.
         free = (row for row in order if row not in out and readers.get(row, set()) <= out)
         least = next(free, None)
         if least is None:
@@ -137,14 +137,14 @@ def least_correctives(dna: Dna, leaving: int, contribution: Doubles) -> list[int
 
 
 def require_correctives(dna: Dna, correctives: int) -> None:
-    """Refuse a number of correctives that cannot be.
+    """Check a number of correctives.
 
     Args:
         dna: the face.
-        correctives: how many are to stay.
+        correctives: the number to keep.
 
     Raises:
-        ArgumentError: a face without correctives, or with fewer.
+        ArgumentError: the face has no correctives, or fewer.
     """
     if not dna.psd_count:
         raise ArgumentError("correctives: the face has none, so that none can be taken out")

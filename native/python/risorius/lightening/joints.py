@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Which joints a face can do without: again and again the one whose vertices others move most
-alike."""
+"""Selects the joints that a face can lose: repeatedly the joint whose vertices other joints move
+most similarly."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from ..base.words import counted
 from ..rigs.joint_controls import joint_controls
 from .simplex import shares
 
-_HEIRS = 5  # joints that may take over what one did
-# Joints that people and programs turn, look for or fasten things to.
+_HEIRS = 5  # joints that may take over the vertices of one joint
+# Joints that users and programs turn, look up or attach objects to.
 _NEEDED = re.compile(
     r"root|pelvis|hips|spine.*|neck.*|head|facial_c_(facialroot|jaw|neck.*root)|jaw"
     r"|facial_[lr]_eye|(eye_?[lr]|[lr]_?eye)"
@@ -26,15 +26,15 @@ _NEEDED = re.compile(
 
 
 def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
-    """Joints that cannot leave: neck, head, jaw, eyes and root by their names, those whose rotation
-    controls hold, those that networks, twists and swings move, and all that these hang on.
+    """Joints that must stay: neck, head, jaw, eyes and root by their names, joints with rotation
+    controls, joints that networks, twists and swings move, and all ancestors of these.
 
     Args:
         dna: the face.
-        asked: names of others.
+        asked: names of further joints.
 
     Raises:
-        ArgumentError: a name that no joint has.
+        ArgumentError: an unknown name.
     """
     names = dna.joint_names
     for name in asked:
@@ -59,7 +59,7 @@ def needed_joints(dna: Dna, asked: Sequence[str] = ()) -> list[int]:
 
 
 def mirrored_joints(dna: Dna) -> Ints:
-    """int64[joints]: of each joint that of the other side by its place, else itself.
+    """int64[joints]: the joint at the mirrored place on the other side, otherwise the joint itself.
 
     Args:
         dna: the face.
@@ -80,7 +80,7 @@ def mirrored_joints(dna: Dna) -> Ints:
 
 
 class Leaving:
-    """Joints that leave one after the other, each handing its vertices to those most like it."""
+    """Removes joints one after the other; each gives its vertices to the most similar joints."""
 
     def __init__(
         self,
@@ -89,13 +89,14 @@ class Leaving:
         held: list[tuple[Ints, Doubles]],
         importance: Doubles,
     ) -> None:
-        """Begins.
+        """Start with all joints.
 
         Args:
-            products: float64[J, 4, J, 4]: over all poses, what two joints add to a point.
+            products: float64[J, 4, J, 4]: products of the motions of two joints, summed over all
+                poses.
             points: float64[V, 4], vertices of all meshes, (p, 1).
-            held: of each joint its vertices and their weights.
-            importance: float64[V] of a vertex' squared error.
+            held: vertices and weights of each joint.
+            importance: float64[V], weight of a vertex's squared error.
         """
         count = len(held)
         self.products, self.points, self.held = products, points, list(held)
@@ -109,14 +110,14 @@ class Leaving:
     def choose(
         self, leaving: int, fixed: Sequence[int], parents: Ints, pairs: Ints, levels: Doubles
     ) -> list[int]:
-        """The joints that leave, the first first.
+        """The removed joints, in order.
 
         Args:
-            leaving: how many are to.
-            fixed: those that stay.
-            parents: int64[J]; a joint stays as long as another hangs on it.
-            pairs: int64[J], the joint of the other side.
-            levels: bool[J, levels], where a joint is listed: its heirs are listed there too.
+            leaving: number of joints to remove.
+            fixed: joints that must stay.
+            parents: int64[J]; a joint stays as long as it has children.
+            pairs: int64[J], the joint on the other side.
+            levels: bool[J, levels], the levels that list a joint; its heirs are listed there too.
         """
         self.levels = levels
         can = np.ones(len(parents), bool)
@@ -149,7 +150,8 @@ class Leaving:
         return out
 
     def _price(self, joint: int) -> None:
-        """Squared error of a joint's vertices when the best mixture of others takes them."""
+        """The squared error of a joint's vertices if the best mixture of other joints takes
+        them."""
         vertices, weights = self.held[joint]
         rows = self.points[vertices]
         spread = (rows * (self.importance[vertices] * weights**2)[:, None]).T @ rows
@@ -190,15 +192,15 @@ class Leaving:
 
 
 def require_count(dna: Dna, joints: int, needed: Sequence[int]) -> None:
-    """Refuse a number of joints that cannot be.
+    """Check a number of joints.
 
     Args:
         dna: the face.
-        joints: how many are asked for.
-        needed: those that must stay.
+        joints: the requested number.
+        needed: joints that must stay.
 
     Raises:
-        ArgumentError: more joints than there are, or fewer than must stay.
+        ArgumentError: more joints than the face has, or fewer than must stay.
     """
     there = len(dna.joint_names)
     if joints > there:
@@ -215,7 +217,7 @@ def require_count(dna: Dna, joints: int, needed: Sequence[int]) -> None:
 
 
 def joint_table(dna: Dna) -> Doubles:
-    """bool[J, levels]: which joints each level lists; all where the file does not say.
+    """bool[J, levels]: the joints that each level lists; all if the file has no list.
 
     Args:
         dna: the face.
@@ -229,11 +231,11 @@ def joint_table(dna: Dna) -> Doubles:
 
 
 def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubles]]:
-    """Of each joint its vertices, counted over all meshes, and their weights.
+    """The vertices of each joint, numbered over all meshes, and their weights.
 
     Args:
-        meshes: of the face.
-        joints: how many it has.
+        meshes: meshes of the face.
+        joints: number of joints.
     """
     vertices, owners, weights, first = [], [], [], 0
     for mesh in meshes:
@@ -249,4 +251,4 @@ def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubl
     ends = np.cumsum(np.bincount(owner, minlength=joints))[:-1]
     return list(
         zip(np.split(vertex[order], ends), np.split(weight[order], ends), strict=True)
-    )  # a vertex may list a joint twice: both count
+    )  # a vertex may list a joint twice: both weights count

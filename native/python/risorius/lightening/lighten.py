@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A finished face made lighter: fewer joints, correctives and levels of detail.
+"""Makes a finished face lighter: fewer joints, correctives and levels of detail.
 
-Dna --levels--> --correctives--> --joints leave, weights are fitted anew--> --blend shapes--> Dna
+Dna --levels--> --correctives--> --joints, weights refitted--> --blend shapes--> Dna
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ from .weights import Refit
 
 Progress = Callable[[float], bool | None]
 
-# Tables of what joints do in all poses may be so large beside the face.
-_ROUNDS = 4  # of choosing joints and fitting weights
-_BETTER = 0.97  # of the largest error before: less is worth another round
-_FIGHT = 1.0  # how much more a pose counts that is further off
+_ROUNDS = 4  # of choosing joints and refitting weights
+_BETTER = 0.97  # another round needs an error below this share of the last one
+_FIGHT = 1.0  # how much the importance of a pose grows with its error
+# Limits of the tables of joint motions in all poses.
 _BASE_BYTES, _BYTES_PER_BYTE = 1 << 29, 128
 
 
 @dataclass
 class Size:
-    """What a face has and costs."""
+    """The contents and the costs of a face."""
 
     joints: int
     correctives: int
@@ -52,17 +52,17 @@ class Size:
     meshes: int
     channels: int
     deltas: int
-    coefficients: int  # of joint groups, zeros too
+    coefficients: int  # of joint groups, zeros included
     file_bytes: int
-    microseconds: float  # of an evaluation at the finest level
+    microseconds: float  # of one evaluation at the finest level
 
     @classmethod
     def of(cls, dna: Dna, file_bytes: int, rig: Rig) -> Size:
-        """What a face has.
+        """Measure a face.
 
         Args:
             dna: the face.
-            file_bytes: of its file.
+            file_bytes: size of its file.
             rig: compiled from it.
         """
         return cls(
@@ -80,22 +80,22 @@ class Size:
 
 @dataclass
 class ExpressionError:
-    """How far the lighter face is off in one pose, over all levels that were kept."""
+    """The error of the lighter face in one pose, over all kept levels."""
 
-    name: str  # of the control, or of all controls of a corrective with a + between
+    name: str  # of the control, or of a corrective's controls joined by +
     largest_mm: float
-    rms_mm: float  # of the level at which it is largest
+    rms_mm: float  # of the level with the largest error
     lod: int  # of the lighter face
-    corrective: str  # "": one control alone; "kept" or "removed"
+    corrective: str  # "": a single control; otherwise "kept" or "removed"
 
 
 @dataclass
 class LightenReport:
-    """What lighten did."""
+    """The result of lighten."""
 
     before: Size
     after: Size
-    lods: list[int]  # that were kept, as the input counts them
+    lods: list[int]  # kept levels, in the numbering of the input
     removed_joints: list[str] = field(default_factory=list)
     removed_correctives: list[str] = field(default_factory=list)
     expressions: list[ExpressionError] = field(default_factory=list)
@@ -103,7 +103,7 @@ class LightenReport:
 
 @dataclass
 class _Work:
-    """The face with the levels that stay, and how its vertices are looked at."""
+    """The face with the remaining levels, and the poses in which it is compared."""
 
     dna: Dna
     poses: list[Pose]
@@ -124,31 +124,31 @@ def lighten(
 ) -> tuple[Dna, LightenReport]:
     """The same face with fewer joints, correctives and levels of detail.
 
-    Raw and GUI controls keep their names and numbers, joints that stay keep their names and what
-    controls do to them: animation plays on. Joints leave that others can stand for with the least
-    error, those of both sides together; their vertices' weights are fitted anew over all
-    expressions. Correctives leave that move vertices least. Root, spine, neck, head, jaw and eyes
-    stay, joints that networks, twists, swings or controls of rotations need, and all that these
-    hang on.
+    Raw and GUI controls keep their names and numbers; remaining joints keep their names and their
+    motions, so that animation still plays. Joints are removed whose vertices other joints can move
+    with the least error, both sides together; the weights of their vertices are refitted over all
+    expressions. Correctives are removed that move vertices least. Root, spine, neck, head, jaw and
+    eyes stay, as do joints that networks, twists, swings or rotation controls need, and all
+    ancestors of these.
 
     Args:
-        dna: a face with meshes; it stays as it is.
-        joints: how many there are to be; None: all that the levels need.
-        correctives: how many there are to be; None: all.
-        lods: the levels that stay, 0 is the finest; None: all.
-        keep: names of joints that stay as well.
-        shapes_mm: blend shapes hold what vertices are further off, in mm; None: they get nothing.
+        dna: a face with meshes; not changed.
+        joints: number of joints to keep; None: all that the levels need.
+        correctives: number of correctives to keep; None: all.
+        lods: the levels to keep, 0 is the finest; None: all.
+        keep: names of further joints that must stay.
+        shapes_mm: vertices with a larger error in mm are corrected by blend shapes; None: none are.
         measured: whether expressions are compared.
-        progress: told the share that is done, 0 to 1; False stops.
+        progress: called with the share of the work, 0 to 1; returning False stops.
 
     Returns:
         The lighter face and a report.
 
     Raises:
-        ArgumentError: more joints or correctives than there are, fewer joints than must stay, a
-            level that is not there, a face without correctives or meshes, nothing to do.
-        BudgetError: a face whose tables would be far larger than its file.
-        DnaError: a face that does not fit together; "stopped" where progress said so.
+        ArgumentError: more joints or correctives than the face has, fewer joints than must stay, an
+            unknown level, a face without correctives or meshes, nothing to do.
+        BudgetError: the face's tables would be far larger than its file.
+        DnaError: an inconsistent face; "stopped" if progress returned False.
     """
     if joints is None and correctives is None and lods is None:
         raise ArgumentError("joints, correctives or lods: one at least was expected")
@@ -185,7 +185,7 @@ def lighten(
 
 
 def _levels(dna: Dna, lods: Sequence[int] | None) -> list[int]:
-    """The levels that stay, ascending. Raises: ArgumentError: one is not there, or none stays."""
+    """The levels to keep, ascending. Raises: ArgumentError: an unknown level, or none."""
     count = max(1, dna.lod_count)
     if lods is None:
         return list(range(count))
@@ -198,7 +198,8 @@ def _levels(dna: Dna, lods: Sequence[int] | None) -> list[int]:
 
 
 def _require_finite(dna: Dna) -> None:
-    """Raises ArgumentError for weights and coefficients that are no numbers: no fit knows them."""
+    """Raises ArgumentError for weights and coefficients that are not finite; no fit accepts
+    them."""
     for name, mesh in zip(dna.mesh_names, dna.meshes, strict=False):
         if not np.isfinite(mesh.skin_weights).all():
             raise ArgumentError(f"mesh {name}: skin weights that are finite were expected")
@@ -213,7 +214,7 @@ def _require_finite(dna: Dna) -> None:
 def _require_parts(
     dna: Dna, joints: int | None, correctives: int | None, keep: Sequence[str]
 ) -> None:
-    """Raises ArgumentError for what cannot be done, before work begins."""
+    """Raises ArgumentError for impossible numbers before work begins."""
     if correctives is not None:
         require_correctives(dna, correctives)
     needed = needed_joints(dna, keep)
@@ -222,7 +223,7 @@ def _require_parts(
 
 
 def _check_size(dna: Dna) -> None:
-    """Raises BudgetError where tables would be far larger than the face."""
+    """Raises BudgetError if tables would be far larger than the face."""
     budget = Budget(_BASE_BYTES + _BYTES_PER_BYTE * dna.size_in_bytes(), 0)
     joints, raw = len(dna.joint_names), len(dna.raw_control_names)
     poses = raw + dna.psd_count
@@ -236,7 +237,7 @@ def _check_size(dna: Dna) -> None:
 
 
 def _part(progress: Progress | None, begin: float, end: float) -> Told:
-    """A part of the progress. Raises: DnaError: it said stop."""
+    """A part of the progress. Raises: DnaError: progress returned False."""
 
     def told(share: float) -> None:
         if progress is not None and progress(begin + share * (end - begin)) is False:
@@ -246,7 +247,7 @@ def _part(progress: Progress | None, begin: float, end: float) -> Told:
 
 
 def _fewer_correctives(work: _Work, rig: Rig, correctives: int) -> list[int]:
-    """Rows of the correctives that leave, from 0."""
+    """Rows of the correctives to remove, from 0."""
     contribution = contributions(work.dna, rig, work.poses)
     work.told(1.0)
     return least_correctives(work.dna, work.dna.psd_count - correctives, contribution)
@@ -261,7 +262,7 @@ def _without(dna: Dna, leaving: Sequence[int]) -> Dna:
 
 
 def _dense(dna: Dna) -> Dna:
-    """The face without joint groups that move nothing and columns of 0."""
+    """The face without columns of 0 and without joint groups that move nothing."""
     groups = []
     for group in dna.joint_groups:
         values = np.asarray(group.values)
@@ -284,10 +285,10 @@ def _dense(dna: Dna) -> Dna:
 
 
 def _fewer_joints(work: _Work, dna: Dna, joints: int, keep: Sequence[str]) -> tuple[Dna, list[int]]:
-    """The face with so many joints, and which left.
+    """The face with this number of joints, and the removed joints.
 
-    Poses that are furthest off count more in the next round; of the rounds the one is kept whose
-    largest error at the finest level is the smallest; they end when it falls no more.
+    Poses with large errors count more in the next round. The result is the round with the smallest
+    largest error at the finest level; rounds end when that error stops falling.
     """
     thinning = _Thinning(dna, work.middle, needed_joints(dna, keep))
     counts = np.array([1.0 / np.sqrt(pose.controls) for pose in thinning.poses])
@@ -312,7 +313,7 @@ def _fewer_joints(work: _Work, dna: Dna, joints: int, keep: Sequence[str]) -> tu
 
 
 class _Thinning:
-    """Joints taken out of one face, in several rounds."""
+    """Removes joints of one face in several rounds."""
 
     def __init__(self, dna: Dna, middle: Doubles, needed: Sequence[int]) -> None:
         self.dna, self.middle, self.needed = dna, middle, needed
@@ -320,7 +321,7 @@ class _Thinning:
         self.poses = poses_of(dna, self.rig)
         self.parents = np.asarray(dna.joint_parents, np.int64)
         self.table, self.mirrored = joint_table(dna), mirrored_joints(dna)
-        self.level: dict[int, int] = {}  # the finest of each mesh
+        self.level: dict[int, int] = {}  # the finest level of each mesh
         for lod in reversed(range(dna.lod_count)):
             self.level |= {m: lod for m in listed_meshes(dna, lod) if m < len(dna.meshes)}
         self.numbers = sorted(self.level)
@@ -331,11 +332,11 @@ class _Thinning:
         self.rest = sk.world_matrices(dna, np.zeros((len(self.parents), 9)))[:, :3, 3] - middle
 
     def choose(self, joints: int, counts: Doubles) -> tuple[list[int], Leaving]:
-        """The joints that leave, and who took over from them.
+        """The joints to remove, and the object that knows their heirs.
 
         Args:
-            joints: how many stay.
-            counts: float64[poses], how much each does.
+            joints: number to keep.
+            counts: float64[poses], importance of each pose.
         """
         sizes = np.zeros(max(1, self.dna.lod_count))
         for m, points in zip(self.numbers, self.points, strict=True):
@@ -357,7 +358,7 @@ class _Thinning:
     def made(
         self, gone: Sequence[int], leaving: Leaving, counts: Doubles, levels: Sequence[int]
     ) -> Dna:
-        """The face without some joints, weights of some levels fitted anew."""
+        """The face without some joints, with weights of some levels refitted."""
         stays = np.ones(len(self.parents), bool)
         stays[list(gone)] = False
         out, meshes = copy.copy(self.dna), list(self.dna.meshes)
@@ -376,14 +377,14 @@ class _Thinning:
         return keep_parts(out, joints=stays.tolist(), correctives=[True] * self.dna.psd_count)
 
     def largest(self, made: Dna) -> Doubles:
-        """float64[poses]: how far a vertex of the finest level is off at most."""
+        """float64[poses]: the largest error of a vertex of the finest level."""
         own = Vertices(made, Rig(made), 0)
         ways = (self.goal.at(pose.raw) - own.at(pose.raw) for pose in self.poses)
         return np.array([np.linalg.norm(way, axis=1).max(initial=0.0) for way in ways])
 
 
 def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
-    """float64[V, J]: weights of a mesh after joints took over."""
+    """float64[V, J]: weights of a mesh after the removed joints' vertices were handed over."""
     out = np.zeros((end - begin, joints))
     for joint, (vertices, weights) in enumerate(leaving.held):
         first, last = np.searchsorted(vertices, (begin, end))
@@ -394,9 +395,10 @@ def _rows(leaving: Leaving, begin: int, end: int, joints: int) -> Doubles:
 def _products(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], counts: Doubles, middle: Doubles
 ) -> Doubles:
-    """float64[J, 4, J, 4]: over all poses, what two joints add to a point.
+    """float64[J, 4, J, 4]: products of the motions of two joints, summed over all poses.
 
-    Joints that no pose moves are told apart by what hangs on them, as if it were shifted.
+    For a joint that no pose moves, a shift of its descendants stands in, so that such joints
+    differ.
     """
     count = len(dna.joint_names)
     out = np.zeros((4 * count, 4 * count))
@@ -418,8 +420,8 @@ def _products(
 
 
 def _mates(source: Dna, leaving: Sequence[int], poses: Sequence[Pose]) -> list[tuple[Pose, Pose]]:
-    """Each pose of the source, and the same one of the face without some correctives: the input
-    counts what is left, -1 where it is gone."""
+    """Each pose of the source with the same pose of the face without some correctives; the input is
+    renumbered, -1 if it was removed."""
     raw, rows = len(source.raw_control_names), np.ones(source.psd_count, bool)
     rows[list(leaving)] = False
     place: Ints = np.where(rows, np.cumsum(rows) - 1, -1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How far a lighter face is from the one that it was made from, and what it costs."""
+"""Measures the difference between a lighter face and its source, and the cost of each."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..author.geometry.skeleton import Doubles
 from ..author.work import listed_meshes
 from .poses import Pose
 
-_ACTIVE = 60  # controls that move in a pose that is timed, as in captures
+_ACTIVE = 60  # active controls in a timed pose, as in captures
 _TIMED = 400
 
 Told = Callable[[float], None]
@@ -49,15 +49,15 @@ class Vertices:
 def errors(
     before: Dna, after: Dna, rigs: tuple[Rig, Rig], poses: Sequence[Pose], told: Told
 ) -> tuple[Doubles, Doubles]:
-    """float64[poses, levels]: largest way between the vertices of two faces, and its root mean
-    square, in the file's unit.
+    """float64[poses, levels] each: the largest distance between the vertices of two faces, and its
+    root mean square, in the file's unit.
 
     Args:
         before: one face.
         after: the other, with the same levels and meshes.
         rigs: compiled from them.
-        poses: of both.
-        told: the share that is done.
+        poses: poses of both faces.
+        told: called with the share of the work that is done.
     """
     levels = max(1, before.lod_count)
     largest, square = np.zeros((2, len(poses), levels))
@@ -74,7 +74,7 @@ def errors(
 
 
 def microseconds(rig: Rig) -> float:
-    """Of a call of the evaluator at the finest level, with sixty controls that move, the median.
+    """Median time of one evaluation at the finest level with sixty active controls.
 
     Args:
         rig: a face.

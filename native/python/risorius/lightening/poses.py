@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The poses that a face is held against: each expression, and each corrective with its controls."""
+"""The poses in which faces are compared: each expression, and each corrective with its controls."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from ..rigs.joint_controls import joint_controls
 
-_AT_ONCE = 1 << 16  # joints that are posed at once: they take 1 kB each
+_AT_ONCE = 1 << 16  # joints that are posed at once: 1 kB each
 
 Floats = npt.NDArray[np.float32]
 
@@ -24,10 +24,10 @@ class Pose:
     """Controls of one pose.
 
     Attributes:
-        name: of the control, or of all controls of a corrective with a + between.
+        name: name of the control, or of a corrective's controls joined by +.
         raw: float32[R].
-        input: the raw control or corrective, an index of the control space.
-        controls: how many raw controls take part.
+        input: the raw control or corrective, as an index of the control vector.
+        controls: number of raw controls in the pose.
     """
 
     name: str
@@ -39,8 +39,8 @@ class Pose:
 def poses_of(dna: Dna, rig: Rig) -> list[Pose]:
     """Each raw control at 1, then each corrective with all of its controls at 1.
 
-    Controls that hold the rotation of a joint have no pose of their own: their values are no
-    shares. A pose of a solver stands for the rotations at which it is reached.
+    Controls that hold the rotation of a joint have no pose of their own, because their values are
+    not amounts. A pose of a solver stands for the rotations at which it is reached.
 
     Args:
         dna: the face.
@@ -64,7 +64,7 @@ def _pose(names: Sequence[str], rest: Floats, values: dict[int, float], source: 
     raw = rest.copy()
     for control, value in values.items():
         raw[control] = value
-    # The name of a solver's pose is that of its joints; four parts each would be no name.
+    # A solver's pose is named by its joints; the four parts of each rotation would be too long.
     shown = dict.fromkeys(
         names[c].rpartition(".")[0] if names[c].rpartition(".")[2] in ("qx", "qy", "qz", "qw")
         else names[c] for c in values
@@ -73,7 +73,7 @@ def _pose(names: Sequence[str], rest: Floats, values: dict[int, float], source: 
 
 
 class Factors:
-    """Which raw controls make correctives fire."""
+    """The raw controls that make correctives fire."""
 
     def __init__(self, dna: Dna) -> None:
         """Args:
@@ -84,7 +84,7 @@ class Factors:
         self._solved = _solver_poses(dna)
 
     def of(self, control: int) -> dict[int, float]:
-        """Values of the raw controls at which a control is 1; empty where none makes it so."""
+        """Values of the raw controls at which a control is 1; empty if there are none."""
         values: dict[int, float] = {}
         waiting, seen = [control], set()
         while waiting:
@@ -104,7 +104,7 @@ class Factors:
 
 
 def _solver_poses(dna: Dna) -> dict[int, dict[int, float]]:
-    """Of each control that a pose of a solver writes: the raw controls at that pose."""
+    """For each control that a solver's pose writes: the raw controls at that pose."""
     behavior = dna.rbf_behavior
     at_pose: dict[int, dict[int, float]] = {}
     for solver in behavior.solvers:
@@ -128,12 +128,12 @@ def _solver_poses(dna: Dna) -> dict[int, dict[int, float]]:
 
 
 def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
-    """float64[n, joints, 3, 4]: where joints bring what is fixed to them, about a middle.
+    """float64[n, joints, 3, 4]: motions of points that are fixed to joints, about a middle.
 
     Args:
         dna: the neutral pose and the tree.
-        deltas: float64[n, joints, 9] beside the neutral pose.
-        middle: float64[3], the origin of what they move.
+        deltas: float64[n, joints, 9] relative to the neutral pose.
+        middle: float64[3], the origin of the points.
     """
     posed = sk.world_matrices(dna, deltas)
     rest = sk.world_matrices(dna, np.zeros_like(deltas[0]))
@@ -145,7 +145,7 @@ def motions_at(dna: Dna, deltas: Doubles, middle: Doubles) -> Doubles:
 def motion_rows(
     dna: Dna, rig: Rig, lod: int, poses: Sequence[Pose], middle: Doubles
 ) -> Iterator[Doubles]:
-    """What joints add to points in poses, some poses after the other.
+    """The motions of joints in poses, in blocks of poses.
 
     Args:
         dna: the face.
@@ -167,7 +167,7 @@ def motion_rows(
 
 
 def descendants(parents: Ints, joint: int) -> Ints:
-    """The joint and all that hang on it.
+    """The joint and all of its descendants.
 
     Args:
         parents: int64[J].

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What joints no longer do, put into blend shapes."""
+"""Corrects the errors of removed joints by blend shapes."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .measure import Told, Vertices
 from .poses import Pose, motion_rows
 
-_LEAST_VALUE = 1e-3  # a corrective that fires less than this can hold nothing
+_LEAST_VALUE = 1e-3  # a corrective that fires less cannot hold a shape
 
 
 def add_shapes(
     before: Dna, after: Dna, poses: Sequence[tuple[Pose, Pose]], tolerance: float, told: Told
 ) -> Dna:
-    """The lighter face with blend shapes for what vertices are further off than a tolerance.
+    """The lighter face with blend shapes where vertices have a larger error than a tolerance.
 
-    Expressions come first, then correctives of two controls, of three and so on: each holds what
-    those before leave. Levels get them where they have blend shapes.
+    Expressions come first, then correctives of two controls, of three and so on: each holds the
+    remaining error. Only levels that have blend shapes get new ones.
 
     Args:
-        before: the face that it was made from, with the same levels and meshes.
-        after: the lighter face; it stays as it is.
-        poses: of before, and the same pose of after.
+        before: the source face, with the same levels and meshes.
+        after: the lighter face; not changed.
+        poses: each pose of before with the same pose of after.
         tolerance: in the file's unit.
-        told: the share that is done.
+        told: called with the share of the work that is done.
     """
     stages: dict[int, list[tuple[Pose, Pose]]] = {}
     raw = len(after.raw_control_names)
@@ -49,7 +49,7 @@ def add_shapes(
 def _add_stage(
     before: Dna, after: Dna, old: Rig, poses: Sequence[tuple[Pose, Pose]], tolerance: float
 ) -> Dna:
-    """Blend shapes for some poses, all against the same face."""
+    """Blend shapes for some poses, all computed from the same face."""
     new = Rig(after)
     found: dict[tuple[int, int], tuple[Ints, Doubles]] = {}  # mesh, input: vertices, deltas
     for lod in range(after.lod_count):
@@ -85,7 +85,7 @@ def _has_shapes(dna: Dna, lod: int) -> bool:
 
 
 def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -> Dna:
-    """The face with these deltas beside those that it has."""
+    """The face with these deltas added to its own."""
     out = copy.copy(dna)
     channels = dna.blend_shape_channels
     drives = {
@@ -106,7 +106,7 @@ def _with_shapes(dna: Dna, found: dict[tuple[int, int], tuple[Ints, Doubles]]) -
 
 
 def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
-    """A channel for each of some inputs, before the others: a level has the first so many rows."""
+    """Add a channel for each of some inputs, in front, because a level has the first rows only."""
     if not inputs:
         return {}
     first, raw = len(dna.blend_shape_channel_names), dna.raw_control_names
@@ -129,7 +129,7 @@ def _add_channels(dna: Dna, inputs: Sequence[int]) -> dict[int, int]:
 
 
 def _more(mesh: Mesh, shapes: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with more deltas of some channels."""
+    """The mesh with deltas added to some channels."""
     out, targets = copy.copy(mesh), list(mesh.blend_shape_targets)
     at = {int(target.blend_shape_channel_index): n for n, target in enumerate(targets)}
     for channel, (vertices, deltas) in sorted(shapes.items()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Least squares with shares that are not negative and sum to 1."""
+"""Least squares with shares that are at least 0 and sum to 1."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import numpy as np
 
 from ..author.geometry.skeleton import Doubles
 
-_RIDGE = 1e-7  # of the largest square: what two joints that move alike share is split evenly
-_LEAST = 1e-4  # a smaller share is none
+_RIDGE = 1e-7  # of the largest square: makes two joints that move alike share evenly
+_LEAST = 1e-4  # smaller shares are dropped
 
 
 def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
-    """float64[n, k] with the least w^T G w - 2 b^T w of each row, of sum 1 and none below 0.
+    """float64[n, k]: w of each row that minimises w^T G w - 2 b^T w with sum 1 and w >= 0.
 
-    Shares that come out negative leave, all of a row at once; then the smallest beyond the most
-    that a row may have. It is near the least, not always at it.
+    Negative shares are removed, all of a row at once, and then the smallest beyond the limit. The
+    result is near the minimum, but not always exact.
 
     Args:
         grams: float64[n, k, k], symmetric.
         rights: float64[n, k].
-        most: shares of a row at most.
+        most: largest number of shares in a row.
     """
     count, size = rights.shape
     active = np.ones((count, size), bool)
@@ -45,7 +45,7 @@ def shares(grams: Doubles, rights: Doubles, most: int) -> Doubles:
 
 
 def _solve(grams: Doubles, rights: Doubles, active: Doubles) -> Doubles:
-    """The least with sum 1 over active shares, of any sign; others are 0."""
+    """The minimum with sum 1 over active shares of any sign; others are 0."""
     count, size = rights.shape
     diagonal = np.einsum("nkk->nk", grams)
     largest = diagonal.max(axis=1) + 1e-30

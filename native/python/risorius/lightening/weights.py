@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Skin weights on the joints that stay, so that vertices go where they went."""
+"""Refits skin weights to the remaining joints, so that vertices move as before."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
-_MOST = 12  # influences of a vertex, as faces of this kind have at most
+_MOST = 12  # largest number of influences of a vertex, as usual for such faces
 _TAKEN_OVER, _NEAR = 14, 6  # joints that a vertex tries
 _AT_ONCE = 512  # vertices
-_EVEN = 3e-3  # how much weights are held to those of the joints that took over, which are smooth
+_EVEN = 3e-3  # pull towards the weights of the heirs, which are smooth
 
 
 class Refit:
-    """Weights of one mesh by products of joints over all poses."""
+    """Refits the weights of one mesh by products of joint motions over all poses."""
 
     def __init__(self, products: Doubles, places: Doubles, parents: Ints, kept: Ints) -> None:
         """Args:
-        products: float64[J, 4, J, 4], see joints.Leaving, of the mesh' level.
-        places: float64[J, 3] where joints rest, about the middle.
+        products: float64[J, 4, J, 4] of the mesh's level, see joints.Leaving.
+        places: float64[J, 3], rest positions of the joints relative to the middle.
         parents: int64[J].
-        kept: the joints that stay and that the level lists, ascending.
+        kept: remaining joints that the level lists, ascending.
         """
         self.products = np.ascontiguousarray(products.transpose(0, 2, 1, 3))
         self.places, self.parents, self.kept = places, parents, kept
 
     def refit(self, mesh: Mesh, points: Doubles, rows: Doubles) -> Mesh:
-        """The mesh with weights on the joints that stay.
+        """The mesh with weights on the remaining joints.
 
-        Vertices all of whose joints stay keep theirs to the last bit.
+        Vertices whose joints all remain keep their weights to the last bit.
 
         Args:
-            mesh: with the weights that it had.
-            points: float64[V, 3] about the middle.
-            rows: float64[V, J], the weights after joints took over from others.
+            mesh: with its old weights.
+            points: float64[V, 3] relative to the middle.
+            rows: float64[V, J], weights after the heirs took over.
         """
         had = sk.dense_weights(mesh, len(self.places))
         stays = np.zeros(len(self.places), bool)
@@ -74,10 +74,10 @@ class Refit:
         )  # fmt: skip
         start = np.take_along_axis(rows, tried, axis=1)
         same = (tried[:, :, None] == tried[:, None]) & np.tri(tried.shape[1], k=-1, dtype=bool)
-        twice = same.any(axis=2)  # a joint that is tried already
+        twice = same.any(axis=2)  # the joint is listed already
         start[twice] = 0
         start /= np.maximum(start.sum(axis=1, keepdims=True), 1e-30)
-        # A joint that is there twice never pays.
+        # Makes the second entry of a repeated joint useless.
         at = np.arange(tried.shape[1])
         diagonal = np.einsum("vkk->vk", gram)
         gram[:, at, at] += np.where(twice, 1e3 * diagonal.max(axis=1, keepdims=True) + 1e-12, 0)
@@ -87,7 +87,7 @@ class Refit:
         return tried, found
 
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
-        """int64[n, k]: joints that took over, near ones, and one that the first hangs on."""
+        """int64[n, k]: heirs, near joints, and the parent of the first."""
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
         apart = (points**2).sum(1)[:, None] - 2 * points @ places.T + (places**2).sum(1)
@@ -98,7 +98,7 @@ class Refit:
 
 
 def _with_rows(mesh: Mesh, rows: dict[int, tuple[Ints, Doubles]]) -> Mesh:
-    """The mesh with other weights of some vertices."""
+    """The mesh with new weights of some vertices."""
     out = copy.copy(mesh)
     offsets = np.asarray(mesh.skin_offsets, np.int64)
     joints = np.split(np.asarray(mesh.skin_joint_indices, np.int64), offsets[1:-1])

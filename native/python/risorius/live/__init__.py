@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Live capture: faces over UDP, from Live Link Face, VMC and other senders of OSC.
+"""Live capture: receives faces over UDP from Live Link Face, VMC and other OSC senders.
 
     with Receiver("livelink", host=EVERYWHERE) as receiver:
         take = receiver.record()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What every source of live capture yields: a frame of named values of one subject."""
+"""The result of every live source: a frame of named values of one subject."""
 
 from __future__ import annotations
 
@@ -14,44 +14,45 @@ Floats = npt.NDArray[np.float32]
 
 
 class LiveError(RisoriusError):
-    """Live capture cannot start, or a packet cannot be used; one sentence."""
+    """Live capture cannot start, or a packet cannot be used; the text is one sentence."""
 
     code = "live"
 
 
 class Packet(NamedTuple):
-    """What a decoder read: a whole face, at the sender's own time."""
+    """A decoded packet: a whole face, at the sender's time."""
 
     subject: str
     device: str
-    """What tells two senders apart that call their subject alike; may be empty."""
+    """Distinguishes two senders with the same subject name; may be empty."""
     time: float | None
-    """Seconds on the sender's clock; None where it sends none."""
+    """Seconds on the sender's clock; None if it sends no time."""
     names: tuple[str, ...]
     values: Floats
-    """float32[names]; units of a face 0 to 1, angles in radians."""
+    """float32[names]; units of a face from 0 to 1, angles in radians."""
 
 
 class Frame(NamedTuple):
-    """A packet that was accepted."""
+    """An accepted packet."""
 
     subject: str
     time: float
-    """Seconds on the subject's own clock, never going back: the sender's time, else arrival."""
+    """Seconds on the subject's clock, never decreasing: the sender's time, else the time of
+    arrival."""
     arrival: float
-    """Seconds of this machine's perf_counter: finer on Windows than monotonic."""
+    """Seconds of this machine's perf_counter, which is finer than monotonic on Windows."""
     sequence: int
-    """Counts the subject's frames from 1."""
+    """Number of the subject's frame, from 1."""
     names: tuple[str, ...]
     values: Floats
     """float32[names], read-only."""
 
 
 def unit_name(name: str) -> str:
-    """A unit of ARKit as Apple spells it, from any of the ways in which tools spell it.
+    """The name of an ARKit unit in Apple's spelling, from any usual spelling.
 
-    `EyeBlinkLeft` and `eyeBlink_L` give `eyeBlinkLeft`; what is no such name changes in its first
-    letter only.
+    `EyeBlinkLeft` and `eyeBlink_L` give `eyeBlinkLeft`; any other name changes only in its first
+    letter.
     """
     if name.endswith(("_L", "_R")):
         name = name[:-2] + ("Left" if name.endswith("_L") else "Right")
@@ -59,16 +60,16 @@ def unit_name(name: str) -> str:
 
 
 def turn_angles(forward: Floats, right: Floats, up: Floats) -> tuple[float, float, float]:
-    """Yaw, pitch and roll of a head whose axes are given in the axes of a straight head.
+    """Yaw, pitch and roll of a head from its axes, expressed in the axes of a straight head.
 
     Args:
-        forward, right, up: float[3] unit vectors of the turned head: its own right, up, forward,
-            each as (right, up, forward).
+        forward, right, up: float[3] unit vectors of the turned head, with the components right, up,
+        forward of the straight head.
 
     Returns:
-        Radians: yaw positive to the own left, pitch positive up, roll positive towards the own
-        left shoulder; turned by yaw first, then by pitch, then by roll, each about the axes that
-        the turns before have turned.
+        Radians: yaw positive to the own left, pitch positive up, roll positive towards the own left
+            shoulder; applied as yaw, then pitch, then roll, each about the axes after the turns
+            before.
     """
     yaw = -np.arctan2(forward[0], forward[2])
     pitch = np.arcsin(np.clip(forward[1], -1.0, 1.0))

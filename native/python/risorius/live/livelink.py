@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Live Link Face over UDP, in the app's ARKit mode.
+"""Decodes Live Link Face over UDP, in the app's ARKit mode.
 
-A packet is big-endian and of one of these versions:
+A packet is big-endian and has one of these versions:
 
     1, 2   version u8, subject, seconds f64, frame u32, count u8, count x f32
     5      version u8, device, subject, hours i32, minutes i32, seconds i32, frames i32,
@@ -9,9 +9,9 @@ A packet is big-endian and of one of these versions:
     6      version u8, device, subject, frame i32, sub-frame f32, rate i32, denominator i32,
            count u8, count x f32
 
-A text is a length u32 and that many bytes of UTF-8, without a final zero. Version 6 counts frames
-from midnight. While no face is seen the app sends the head of the packet alone. The values have
-the order of NAMES; 51 or 52 of them are a face without its rotations.
+A text is a length u32 and that number of bytes of UTF-8, without a final zero. Version 6 counts
+frames from midnight. While the app sees no face it sends only the head of the packet. The values
+are in the order of NAMES; 51 or 52 values are a face without rotations.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ _TURNS = ("yaw", "pitch", "roll")
 _ANGLES = [f"{part}.{turn}" for part in ("head", "eyeL", "eyeR") for turn in _TURNS]
 NAMES = (*arkit.order("live_link_face_packet"), *_ANGLES)
 _SHAPES = 52
-# Found on a recording of the app: an eye that looks down has a positive pitch, one that looks to
-# its own right a positive yaw, and its roll has the sign that an eye has which only turns up and
-# aside. So the axes look out of the back of the head, to its own left and up; the head shares them.
+# Found in a recording of the app: an eye that looks down has a positive pitch, one that looks to
+# its own right a positive yaw, and its roll has the sign of an eye that turns only up and aside.
+# The axes therefore point out of the back of the head, to its own left and up; the head uses the
+# same axes.
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
 _COUNTS = (len(NAMES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256
@@ -38,15 +39,15 @@ _LARGEST = 100.0  # no blend shape and no angle of a face is larger
 
 
 class NoFace(LiveError):  # noqa: N818  not an error of the sender
-    """A sound packet of a phone that sees no face."""
+    """A valid packet of a phone that sees no face."""
 
 
 def decode(data: bytes) -> Packet:
-    """Read a packet.
+    """Decode a packet.
 
     Raises:
-        NoFace: it has no values.
-        LiveError: it is not one of Live Link Face; the sentence says where it differs.
+        NoFace: the packet has no values.
+        LiveError: not a packet of Live Link Face; the sentence says where it differs.
     """
     if not data:
         raise LiveError("an empty packet")
@@ -98,7 +99,7 @@ def _of_timestamp(data: bytes, place: int) -> tuple[float | None, int]:
 def _of_timecode(data: bytes, place: int) -> tuple[float | None, int]:
     _need(data, place, 21)
     hours, minutes, seconds, frames = struct.unpack_from(">4i", data, place)
-    # Engines differ in whether the byte for drop frame is sent: the length tells.
+    # Engines differ in sending the byte for drop frame: the length of the packet tells.
     place += 16 if _fits(data, place + 20) or not _fits(data, place + 21) else 17
     _need(data, place, 5)
     (rate,) = struct.unpack_from(">I", data, place)

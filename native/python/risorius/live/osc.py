@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Faces over OSC: VMC, Face Cap and its relatives, and plain messages of a name and a value.
+"""Decodes faces over OSC: VMC, Face Cap and similar apps, and plain messages with a name and a
+value.
 
     /VMC/Ext/Blend/Val  name value      a blend shape; /VMC/Ext/Blend/Apply ends the face
     /VMC/Ext/Bone/Pos   name px py pz qx qy qz qw     Neck, Head, LeftEye and RightEye are used
@@ -8,8 +9,9 @@
     /ELR x y, /ERR x y                  the eyes, in degrees
     /any/path/name value                anything else
 
-Messages come one by one or in bundles. A face is whole at its Apply; of senders that send none,
-at the end of a bundle, when a message comes that the face has already, or when nothing more comes.
+Messages arrive singly or in bundles. A face is complete at its Apply. If the sender sends none, it
+is complete at the end of a bundle, when a message repeats one of its names, or when no further
+message arrives.
 """
 
 from __future__ import annotations
@@ -38,16 +40,16 @@ _NEEDS = "OSC needs the package python-osc, which is not installed: pip install 
 
 
 def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
-    """The messages of a packet, those of its bundles too, in their order.
+    """The messages of a packet and of its bundles, in their order.
 
-    The sizes inside are checked here: python-osc follows a negative one back for ever.
+    The sizes inside are checked here, because python-osc loops for ever on a negative one.
 
     Args:
         data: the packet.
-        depth: how many bundles it lies in.
+        depth: number of enclosing bundles.
 
     Raises:
-        LiveError: the packet is no OSC.
+        LiveError: the packet is not OSC.
     """
     if not data.startswith(_BUNDLE):
         yield _message(data)
@@ -67,7 +69,7 @@ def messages(data: bytes, depth: int = 0) -> Iterator[tuple[str, list[Any]]]:
 
 
 def bundle_time(data: bytes) -> float | None:
-    """Seconds since 1970 that a bundle says it is for; None for "at once" and for a message."""
+    """Seconds since 1970 in a bundle's time tag; None for "at once" and for a message."""
     if not data.startswith(_BUNDLE) or len(data) < 16:
         return None
     whole, part = struct.unpack_from(">II", data, 8)
@@ -75,7 +77,7 @@ def bundle_time(data: bytes) -> float | None:
 
 
 def require() -> None:
-    """Say early that python-osc is missing. Raises: LiveError."""
+    """Raise an error early if python-osc is missing. Raises: LiveError."""
     try:
         import pythonosc  # noqa: F401
     except ImportError as error:
@@ -97,7 +99,7 @@ def _message(data: bytes) -> tuple[str, list[Any]]:
 
 
 class Decoder:
-    """Puts the messages of all senders together to faces.
+    """Combines the messages of all senders into faces.
 
     Args:
         wanted: whether a sender gets a place before all others and keeps it.
@@ -107,18 +109,18 @@ class Decoder:
         self._faces: Roster[str, _Face] = Roster(lambda face: wanted(face.sender))
 
     def feed(self, data: bytes, sender: str, now: float | None = None) -> list[Packet]:
-        """Take a packet in.
+        """Process a packet.
 
         Args:
             data: its bytes.
-            sender: who sent it, the subject of its faces.
-            now: seconds of this machine's perf_counter; None asks it.
+            sender: its sender, the subject of its faces.
+            now: seconds of this machine's perf_counter; None: read it.
 
         Returns:
-            The faces that are whole with it.
+            The faces that it completes.
 
         Raises:
-            LiveError: it is no OSC, or has a value that no face has; what came before stays.
+            LiveError: not OSC, or an impossible value; earlier values stay.
         """
         found = list(messages(data))
         now = perf_counter() if now is None else now
@@ -139,22 +141,22 @@ class Decoder:
         return done
 
     def pending(self) -> bool:
-        """Whether a face waits that nothing but silence ends."""
+        """Whether a face waits that only silence can complete."""
         return any(face.fresh and not face.applies for face in self._faces)
 
     def flush(self) -> list[Packet]:
-        """The faces that nothing but silence ends."""
+        """The faces that only silence completes."""
         waiting = [face for face in self._faces if face.fresh and not face.applies]
         return [packet for face in waiting if (packet := face.finish())]
 
 
 class _Face:
-    """The newest values of one sender: a message that does not come leaves its value."""
+    """The latest values of one sender; a name that is not sent keeps its value."""
 
     def __init__(self, sender: str) -> None:
         self.sender = sender
         self.values: dict[str, float] = {}
-        self._age: dict[str, int] = {}  # name -> number of the last face that had a value for it
+        self._age: dict[str, int] = {}  # name -> number of the last face with a value for it
         self._number = 0
         self.bones: dict[str, tuple[float, ...]] = {}
         self.fresh: set[str] = set()
@@ -163,7 +165,7 @@ class _Face:
         self.quaternion = False
 
     def take(self, address: str, values: list[Any], time: float | None) -> Packet | None:
-        """Take a message in. Returns: the face that ends before it, or with it."""
+        """Process a message. Returns: the face that ends before it, or with it."""
         if address == "/VMC/Ext/Blend/Apply":
             self.applies = True
             return self.finish()
@@ -186,7 +188,7 @@ class _Face:
         return done
 
     def _make_room(self, changes: dict[str, float]) -> None:
-        """Forget those names that were not sent for the longest time, where there are too many."""
+        """Forget the names that were not sent for the longest time if there are too many."""
         if len(self.values.keys() | changes.keys()) <= _MOST_NAMES:
             return
         others = sorted(self._age.keys() - changes.keys(), key=self._age.__getitem__)
@@ -195,7 +197,7 @@ class _Face:
             self.fresh.discard(name)
 
     def finish(self) -> Packet | None:
-        """The face as it is now, if anything of it is new."""
+        """The face with its present values, if any of them is new."""
         if not self.fresh:
             return None
         self.fresh.clear()
@@ -205,7 +207,7 @@ class _Face:
 
 
 def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
-    """The last `count` values, as numbers that a face may have."""
+    """The first `count` values as numbers that a face may have."""
     if len(values) < count:
         raise LiveError(f"{count} numbers were expected, found {len(values)}")
     numbers = tuple(float(v) if isinstance(v, int | float) else math.nan for v in values[:count])
@@ -258,14 +260,14 @@ def _bone(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
 def _head_quaternion(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     face.quaternion = True
     x, y, z, w = _unit(_numbers(values, 4))
-    # ARKit's axes: own left, up, ahead. Seen in own right, up, ahead two parts turn round.
+    # ARKit's axes: own left, up, ahead. In own right, up, ahead two components are negated.
     yaw, pitch, roll = _angles((x, -y, -z, w))
     return "HRQ", {"head.yaw": yaw, "head.pitch": pitch, "head.roll": roll}
 
 
 def _head_degrees(face: _Face, values: list[Any]) -> tuple[str, dict[str, float]]:
     x, y, z = (math.radians(v) for v in _numbers(values, 3))
-    if face.quaternion:  # the same rotation, without an order of angles
+    if face.quaternion:  # the same rotation, but without a defined order of angles
         return "HR", {}
     return "HR", {"head.yaw": y, "head.pitch": -x, "head.roll": -z}
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Receives faces on a thread: the newest frame of each subject, and takes that are recorded.
+"""Receives faces on a thread: the latest frame of each subject, and recorded takes.
 
-The thread touches nothing but its own data, under one lock, for as long as it takes to hand over a
-frame; whoever shows the face asks when it suits.
+The thread uses only its own data, under one lock that is held just while a frame is handed over.
+Viewers poll whenever they like.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ PORTS: dict[str, int] = {name: row["port"] for name, row in toml.parse(_TEXT).it
 SOURCES = tuple(PORTS)
 THIS_MACHINE, EVERYWHERE = "127.0.0.1", "0.0.0.0"
 _SILENCE = 0.004  # seconds without a packet that end a face whose sender does not mark its end
-_WINDOW = 0.05  # seconds over which a flood is counted
-_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # in one window: far more than phones send
-_BUSIEST = 0.02  # seconds of one window in which packets may be read: large packets take long
-_BACK = 1.0  # seconds; a packet older by less came late, by more: the sender's clock was set back
-_AHEAD = 2.0  # seconds that a sender's clock may get ahead of ours and still be believed
-_DRIFT = 0.001  # and this share of the time since its first face, as clocks run unevenly
+_WINDOW = 0.05  # seconds over which packets are counted
+_MOST_PACKETS = {"livelink": 100, "osc": 1000}  # per window: far more than phones send
+_BUSIEST = 0.02  # seconds per window for reading packets, because large packets take long
+_BACK = 1.0  # seconds; an older packet by less came late, by more: the sender's clock was set back
+_AHEAD = 2.0  # seconds that a sender's clock may get ahead of ours
+_DRIFT = 0.001  # plus this share of the time since its first face, because clocks differ in speed
 _DAY = 86400.0
 
 
@@ -42,10 +42,10 @@ _Key = tuple[str, str, str]  # of a subject: address, device, name
 
 
 class Status(NamedTuple):
-    """What a panel or a status line shows."""
+    """Values for a panel or a status line."""
 
     packets: int
-    """All that came, since the start."""
+    """All packets since the start."""
     frames: int
     """Accepted faces of all subjects."""
     per_second: float
@@ -53,40 +53,40 @@ class Status(NamedTuple):
     refused: int
     """Packets that could not be used."""
     reasons: tuple[tuple[str, int], ...]
-    """What was wrong with them, the most frequent first."""
+    """The reasons, the most frequent first."""
     late: int
-    """Faces that came after a newer one of their subject and were left out."""
+    """Dropped faces that arrived after a newer one of their subject."""
     lost: int
-    """Faces that never came, judged by the sender's own time."""
+    """Lost faces, estimated from the sender's times."""
     faceless: int
     """Packets of phones that saw no face."""
     floods: int
-    """Times when packets came faster than they are looked at."""
+    """Number of times that packets arrived faster than they were read."""
     subjects: tuple[str, ...]
     subject: str
-    """The one that this is about; "" while none was heard."""
+    """The subject of these values; "" if none was heard."""
     age: float | None
     """Seconds since its last face."""
     recording: int
-    """Faces in the takes that are being recorded."""
+    """Faces in the running recordings."""
 
 
 class _Subject:
-    """One face: its clock and its newest frame."""
+    """One subject: its clock and its latest frame."""
 
     def __init__(self, label: str) -> None:
         self.label = label
         self.latest: Frame | None = None
         self.lost = 0
         self._offset = 0.0
-        self._sent = 0.0  # the sender's time of the newest frame, midnights added
+        self._sent = 0.0  # the sender's time of the latest frame, including days
         self._days = 0.0
         self._began = (0.0, 0.0)  # time and arrival of the first frame
         self._steps: deque[float] = deque(maxlen=31)
         self.arrivals: deque[float] = deque(maxlen=512)
 
     def accept(self, packet: Packet, arrival: float) -> Frame | None:
-        """The packet as a frame, or None for one that came late."""
+        """The packet as a frame, or None if it came late."""
         time = self._own_time(packet.time, arrival)
         if time is None:
             return None
@@ -99,7 +99,7 @@ class _Subject:
         return self.latest
 
     def _own_time(self, sent: float | None, arrival: float) -> float | None:
-        """The sender's time without its leaps; arrival, where it sends none."""
+        """The sender's time without jumps; the time of arrival if it sends none."""
         last = self.latest
         if sent is None:
             return arrival if last is None else max(arrival, last.time)
@@ -122,10 +122,10 @@ class _Subject:
         return self._sent + self._offset
 
     def _lead(self, time: float, arrival: float) -> float:
-        """Seconds by which the sender's clock would be farther ahead of ours than is believed.
+        """Seconds by which the sender's clock would be ahead of ours beyond the tolerance.
 
-        Counted from the first frame, not from the last one: what is believed of single packets
-        would add up, and a recording last longer than it took.
+        Counted from the first frame and not from the last one, because tolerances of single packets
+        would add up and make a recording longer than it took.
         """
         passed = arrival - self._began[1]
         return time - self._began[0] - passed - _AHEAD - _DRIFT * passed
@@ -148,7 +148,7 @@ class Receiver:
     Args:
         source: "livelink" or "osc".
         port: 0 for any free one; None for the source's own.
-        host: the address to listen at: THIS_MACHINE, or EVERYWHERE for phones.
+        host: the address to listen on: THIS_MACHINE, or EVERYWHERE for phones.
     """
 
     def __init__(
@@ -178,7 +178,7 @@ class Receiver:
         self.stop()
 
     def start(self) -> None:
-        """Listen. Raises: LiveError, where the port cannot be had or a package is missing."""
+        """Start listening. Raises: LiveError: the port is not available or a package is missing."""
         if self._thread is not None:
             return
         if self.source == "osc":
@@ -190,7 +190,7 @@ class Receiver:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop listening; the last frames and takes stay."""
+        """Stop listening; the latest frames and takes stay."""
         self._stop.set()
         if self._thread is not None:
             self._thread.join(2.0)
@@ -200,30 +200,30 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The newest frame of a subject, or of the one heard first of those that are known."""
+        """The latest frame of a subject; by default of the known subject that was heard first."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
 
     def reserve(self, subjects: Iterable[str]) -> None:
-        """Keep a place for these subjects, however many others are heard.
+        """Reserve places for these subjects, independent of other senders.
 
-        A subject that is recorded has its place without this.
+        A subject that is being recorded has a place anyway.
 
         Args:
-            subjects: as the app names them; they replace what was reserved before.
+            subjects: names in the app; they replace earlier reservations.
         """
         self._reserved = frozenset(subjects)
 
     def _kept(self, label: str) -> bool:
-        """Whether a subject keeps its place: a take would jump if its clock began anew."""
+        """Whether a subject keeps its place: a take would jump if its clock restarted."""
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:
-        """Record a subject, or the one heard first of those that are known, until `finish`.
+        """Record a subject, by default the one heard first, until `finish`.
 
         Args:
-            limit: frames that are kept at most, half an hour at 60 a second.
+            limit: largest number of frames, by default half an hour at 60 per second.
         """
         with self._lock:
             found = self._find(subject)
@@ -232,14 +232,14 @@ class Receiver:
         return take
 
     def finish(self, take: Take) -> Take:
-        """End a recording. Returns: it."""
+        """End a recording. Returns: the take."""
         with self._lock:
             if take in self._takes:
                 self._takes.remove(take)
         return take
 
     def status(self, subject: str = "") -> Status:
-        """What has come so far."""
+        """The state of the reception."""
         now = perf_counter()
         with self._lock:
             found = self._find(subject)
@@ -285,8 +285,8 @@ class Receiver:
             self._take_in(data, sender[0], now)
             seen, spent = seen + 1, spent + perf_counter() - now
             if seen >= _MOST_PACKETS[self.source] or spent >= _BUSIEST:
-                # Packets that come meanwhile wait in the system's buffer and are dropped when it is
-                # full: so a flood takes no time from the viewport.
+                # Further packets wait in the system's buffer and are dropped when it is full, so
+                # that a flood takes no time from the viewport.
                 self._counts["floods"] += 1
                 self._stop.wait(max(0.0, window + _WINDOW - perf_counter()))
         self._keep(self._decoder.flush(), perf_counter())
@@ -331,16 +331,16 @@ class Receiver:
                     take.add(frame)
 
     def _subject_of(self, packet: Packet, now: float, sender: str) -> _Subject | None:
-        """Whose face it is; None where there is no room for another.
+        """The subject of a face; None if there is no room for a new one.
 
         Args:
             packet: a face.
             now: seconds.
-            sender: the address it came from; of OSC the subject is the address.
+            sender: its address; for OSC the subject is the address.
         """
         key = (sender or packet.subject, packet.device, packet.subject)
         with self._lock:
-            if packet.device:  # a phone that changed its address, and fell silent at the one before
+            if packet.device:  # a phone that changed its address and is silent at the old one
                 self._subjects.move(key, lambda other: other[1:] == key[1:], now, key[0])
             subject = self._subjects.hear(key, now)
             if subject is not None:
@@ -350,7 +350,7 @@ class Receiver:
         return subject if added else None
 
     def _free_label(self, packet: Packet, address: str) -> str:
-        """The label of a new subject: its own name, unless another subject has it."""
+        """The label of a new subject: its name, or a variant if another subject has that."""
         name, taken = (
             packet.subject or packet.device or "unnamed",
             {s.label for s in self._subjects},
@@ -363,7 +363,7 @@ class Receiver:
 
 
 def own_address() -> str:
-    """The address at which the devices of the network find this machine; "" without a network."""
+    """The address under which devices in the network find this machine; "" without a network."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))  # nothing is sent, only the route is looked up
@@ -378,7 +378,8 @@ def _bound(host: str, port: int) -> socket.socket:
         raise LiveError(f"a port of 0 to 65535 was expected, found {port}")
     listener = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        # Without SO_REUSEADDR, which would let two programs have the port and one the packets.
+        # SO_REUSEADDR is not set, because two programs could then share the port and one lose the
+        # packets.
         listener.bind((host, port))
     except OSError as error:
         listener.close()

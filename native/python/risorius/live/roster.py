@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Who is listened to: a bounded number of senders, and who gives its place to a new one.
+"""A bounded list of senders, and the rule by which a sender gives its place to a new one.
 
-A flood of invented senders must not push out a phone. So:
-
-    a wanted sender (it is named, or it is recorded) always gets a place and keeps it
-    the first sender of each address keeps its place once it has streamed, also while it is silent
-    an address with several senders more than the newcomer's address gives one of them up
-    of the others, a silent one gives way to a newcomer
+A flood of invented senders must not displace a phone. Therefore:
+    a wanted sender (named or recorded) always gets a place and keeps it
+    the first sender of each address keeps its place once it has streamed, even while silent
+    an address with several more senders than the newcomer's address gives up one of them
+    any other sender gives way to a newcomer while it is silent
 """
 
 from __future__ import annotations
@@ -17,8 +16,8 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 MOST = 32
-_STREAM = 5  # times within a second that make a sender one that streams
-_FORGOTTEN = 60.0  # seconds of silence after which whoever comes next takes the place
+_STREAM = 5  # messages within a second that make a sender a streaming one
+_FORGOTTEN = 60.0  # seconds of silence after which any newcomer takes the place
 
 Key = TypeVar("Key", bound=Hashable)
 Item = TypeVar("Item")
@@ -26,13 +25,13 @@ Item = TypeVar("Item")
 
 @dataclass
 class _Place(Generic[Item]):
-    """A sender that is listened to.
+    """A sender with a place.
 
     Attributes:
-        item: what is kept of it.
-        address: where it sends from.
-        heard: seconds at which it was heard last.
-        streamed: whether it was ever heard _STREAM times within a second.
+        item: its record.
+        address: its address.
+        heard: times of its last messages, in seconds.
+        streamed: whether it ever sent _STREAM messages within a second.
     """
 
     item: Item
@@ -45,16 +44,16 @@ class _Place(Generic[Item]):
         self.streamed = self.streamed or self.times(now) == _STREAM
 
     def times(self, now: float) -> int:
-        """How often it was heard within the last second, at most _STREAM."""
+        """Number of messages within the last second, at most _STREAM."""
         return sum(time > now - 1.0 for time in self.heard)
 
 
 class Roster(Generic[Key, Item]):
-    """The record of each sender, in the order of their first packets.
+    """The records of senders, in the order of their first packets.
 
     Args:
         wanted: whether an item gets a place before all others and keeps it.
-        most: places.
+        most: number of places.
     """
 
     def __init__(
@@ -68,11 +67,11 @@ class Roster(Generic[Key, Item]):
         return (place.item for place in self._places.values())
 
     def hear(self, key: Key, now: float) -> Item | None:
-        """What is kept of a sender that was heard just now; None for one that is not known.
+        """The record of a sender that was heard just now; None for an unknown one.
 
         Args:
-            key: of the sender.
-            now: seconds, of a clock that does not run back.
+            key: key of the sender.
+            now: seconds, of a monotonic clock.
         """
         place = self._places.get(key)
         if place is None:
@@ -81,33 +80,34 @@ class Roster(Generic[Key, Item]):
         return place.item
 
     def move(self, key: Key, same: Callable[[Key], bool], now: float, address: str) -> None:
-        """Let a sender that is heard under another key have the place that it had.
+        """Move the place of a sender to another key under which it is heard.
 
         Args:
-            key: under which it is heard; where it is known nothing changes.
-            same: whether another key is of the same sender, which was silent for a second there.
+            key: the new key; nothing changes if it is known.
+            same: whether another key belongs to the same sender, which was silent there for a
+                second.
             now: seconds.
-            address: where it sends from now.
+            address: its new address.
         """
         if key in self._places:
             return
         for old, place in self._places.items():
             if same(old) and place.times(now) == 0:
                 place.address = address
-                # The order of the places stays: it says who was there first.
+                # The order of the places stays, because it tells who came first.
                 self._places = {key if k == old else k: p for k, p in self._places.items()}
                 return
 
     def add(self, key: Key, item: Item, now: float, address: str = "") -> bool:
-        """Keep a sender that was heard for the first time just now.
+        """Add a sender that was heard for the first time just now.
 
         Args:
-            key, item: the sender and what is kept of it.
+            key, item: the sender and its record.
             now: seconds.
-            address: where it sends from.
+            address: its address.
 
         Returns:
-            Whether there was room for it.
+            Whether there was room.
         """
         for old, place in list(self._places.items()):
             if place.heard[-1] < now - _FORGOTTEN and not self._wanted(place.item):

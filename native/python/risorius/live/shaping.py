@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From what a sender says to raw controls: calibration, mapping, ranges, gain, smoothing."""
+"""From a sender's values to raw controls: calibration, mapping, ranges, gain, smoothing."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from .frame import Floats, Frame
 HEAD = ("head.yaw", "head.pitch", "head.roll")
 _EYES = ("eyeL.yaw", "eyeL.pitch", "eyeR.yaw", "eyeR.pitch")
 _IGNORED = {"eyeL.roll", "eyeR.roll"}
-_LOOK_AT_ONE = math.radians(30.0)  # an eye's turn that a look control at 1 stands for
-_STILL = 12.0  # Hz at which a still face is cut with almost no smoothing, to a twentieth with all
-_LONGEST_GAP = 0.5  # seconds without a frame after which smoothing begins anew
+_LOOK_AT_ONE = math.radians(30.0)  # rotation of an eye for a look control at 1
+# Cutoff in Hz for a still face with almost no smoothing; a twentieth of it with full smoothing.
+_STILL = 12.0
+_LONGEST_GAP = 0.5  # seconds without a frame after which the filter restarts
 Row = dict[str, float]
-_SENDERS = "vrm"  # the vocabulary of those that send letters
+_SENDERS = "vrm"  # vocabulary of senders that send letters
 _ANGLES = {*HEAD, *_EYES, *_IGNORED}
 
 
@@ -39,14 +40,14 @@ class Controls(NamedTuple):
 
 
 class Plan:
-    """The way from names that a sender uses to controls, compiled once for a set of names.
+    """The conversion of a sender's names to controls, compiled once for a set of names.
 
     Attributes:
-        controls: the controls that the names reach.
+        controls: the resulting controls.
         matrix: float32[controls, names].
-        shares: place of a control, and of the one that it takes back a share of.
-        adjusted: (place of a control, what the mapping does to it).
-        unmapped: names that reach none, and that the mapping does not leave out either.
+        shares: index of a control, and of the control of which it takes back a share.
+        adjusted: (index of a control, adjustment of the mapping).
+        unmapped: names without a control that the mapping does not ignore either.
         is_angle: bool[names].
         head: bool[controls], the three angles of the head.
         is_share: bool[controls].
@@ -78,7 +79,7 @@ class Plan:
 
 
 def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
-    """The controls of each name; none for what is left out, None for what nobody knows."""
+    """The controls of each name; empty for an ignored name, None for an unknown one."""
     find = mapping.finder()
     rows = [found[1] if (found := find(name)) else None for name in names]
     units = sum(bool(row) for row in rows)
@@ -98,12 +99,12 @@ def _rows(names: tuple[str, ...], mapping: Mapping) -> list[Row | None]:
 
 
 def _row(said: Meaning, mapping: Mapping) -> Row:
-    """A meaning in controls, its units as the mapping has them."""
+    """A meaning as controls; its units are converted by the mapping."""
     return _through(dict(said.units), mapping) if said.units else row_of(said)
 
 
 def _through(row: Row, mapping: Mapping) -> Row:
-    """A row in units as a row in controls."""
+    """A row of units as a row of controls."""
     result: Row = {}
     for unit, weight in row.items():
         for control, share in mapping.rows.get(unit, {}).items():
@@ -112,7 +113,8 @@ def _through(row: Row, mapping: Mapping) -> Row:
 
 
 def _look(name: str, mapping: Mapping) -> Row:
-    """An eye's angle as look controls: one side with its sign, the other against it."""
+    """An eye's angle as look controls: one control takes the positive part, the other the
+    negative."""
     side = "Left" if name[3] == "L" else "Right"
     if name.endswith("pitch"):
         ahead, back = f"eyeLookUp{side}", f"eyeLookDown{side}"
@@ -128,23 +130,23 @@ def _new_filter() -> OneEuro:
 
 
 class Shaper:
-    """Turns frames into controls. Not for several threads, nor for several subjects, at once.
+    """Turns frames into controls. Use one per subject and thread.
 
     Args:
-        mapping: risorius.importing.Mapping, the name of one that comes with Risorius, or a file.
+        mapping: risorius.importing.Mapping, the name of a built-in one, or a file.
 
     Attributes:
-        mapping: the Mapping; names that it does not have may be raw controls, angles of the head,
-            names of any vocabulary.
-        gain: factor on all units, but none on a share of another control: shut lips stay shut.
-        head_gain: factor on the head's angles, negative to turn them round.
-        gains: factor for single units, by their name as the frame has it, beside `gain`.
-        smoothing: 0 for none, to 1: a one-euro filter, which holds a still face still and lets a
-            quick move pass.
-        maximum: controls are clamped to it.
-        neutral: the values that count as a face at rest, by name; see `capture`.
-        ranges: of the person, taken out of the controls before the gain; None: controls are as
-            captured. Beside `neutral` only their extremes count.
+        mapping: the Mapping; other names may be raw controls, angles of the head, or names of any
+            vocabulary.
+        gain: factor on all units except shares of another control: shut lips stay shut.
+        head_gain: factor on the head's angles; negative reverses them.
+        gains: factors for single units by their name in the frame, in addition to `gain`.
+        smoothing: 0 for none, to 1: a one-euro filter, which calms a still face and passes quick
+            moves.
+        maximum: upper limit of controls.
+        neutral: values of the face at rest, by name; see `capture`.
+        ranges: ranges of the person, applied to the controls before the gain; None: controls are as
+            captured. With `neutral` only their extremes are used.
     """
 
     def __init__(
@@ -177,7 +179,7 @@ class Shaper:
         self._ranges, self._remap = ranges, None
 
     def plan(self, names: tuple[str, ...]) -> Plan:
-        """The way of these names; kept for the next frame, which mostly has the same."""
+        """The plan for these names; kept because the next frame mostly has the same names."""
         if self._plan is None or names != self._names:
             self._plan, self._names = Plan(names, self.mapping), names
             self._filter, self._remap = _new_filter(), None
@@ -189,7 +191,7 @@ class Shaper:
         return self._plan
 
     def capture(self, frame: Frame | None) -> None:
-        """Take a frame as the face at rest; None forgets it."""
+        """Use a frame as the face at rest; None forgets it."""
         self.neutral, self._remap = {}, None
         if frame is not None:
             self.neutral = dict(zip(frame.names, map(float, frame.values), strict=True))
@@ -200,20 +202,21 @@ class Shaper:
         return self._plan.unmapped if self._plan else ()
 
     def without_smoothing(self) -> Shaper:
-        """One of the same settings for a recording."""
+        """A Shaper with the same settings except smoothing, for a recording."""
         other = Shaper(self.mapping, gain=self.gain, head_gain=self.head_gain, maximum=self.maximum)
         other.gains, other.neutral = dict(self.gains), dict(self.neutral)
         other.ranges = self.ranges
         return other
 
     def apply(self, frame: Frame) -> Controls:
-        """The controls of a frame. Frames are to come in the order of their times."""
+        """The controls of a frame. Call it in the order of the frames' times."""
         plan = self.plan(frame.names)
         values = plain = self._calibrated(frame, plan.is_angle)
         if self.gains:
             values = values * np.array([self.gains.get(n, 1.0) for n in frame.names], np.float32)
         result = plan.matrix @ values
-        for place, whole in plan.shares:  # of what was captured: a gain of the jaw parts no lips
+        # Of the captured values, because a gain of the jaw must not part the lips.
+        for place, whole in plan.shares:
             result[place] = share_of(result[place], plan.matrix[whole] @ plain)
         for place, change in plan.adjusted:
             result[place] = change.apply(result[place])
@@ -228,7 +231,7 @@ class Shaper:
         return Controls(plan.controls, result)
 
     def _calibrated(self, frame: Frame, is_angle: np.ndarray) -> Floats:  # type: ignore[type-arg]
-        """Values with the face at rest taken away; what is left of a unit still reaches 1."""
+        """Values minus the face at rest, rescaled so that a unit still reaches 1."""
         if not self.neutral:
             return frame.values
         rest = np.array([self.neutral.get(n, 0.0) for n in frame.names], np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What was recorded: the frames of one subject, as they came."""
+"""A recording: the frames of one subject, unchanged."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .shaping import Plan, Shaper
 
 
 class Take:
-    """Frames of one subject at their own times, in order; gaps stay gaps.
+    """Frames of one subject with their times, in order; gaps are kept.
 
     Attributes:
         subject: whom it follows; "" until the first frame decides.
@@ -28,7 +28,7 @@ class Take:
         return len(self._frames)
 
     def add(self, frame: Frame) -> None:
-        """Keep a frame, if it is of the subject; one of the same time takes the other's place."""
+        """Keep a frame of the subject; a frame with an unchanged time replaces the last one."""
         self.subject = self.subject or frame.subject
         if frame.subject != self.subject:
             return
@@ -43,11 +43,11 @@ class Take:
         """The take as a clip of raw controls, starting at 0.
 
         Args:
-            shaper: how values become controls; without smoothing, which can be added later and
-                could not be taken away.
+            shaper: converts values to controls; its smoothing is ignored, because it can be added
+                later but not removed.
 
         Returns:
-            A Clip with times of its own. A control that came later than others is 0 before.
+            A Clip with individual times. A control that arrived later than others is 0 before.
         """
         shaper = (shaper or Shaper()).without_smoothing()
         rows = [shaper.apply(frame) for frame in self._frames]
@@ -66,13 +66,13 @@ class Take:
         return Clip(names, curves, _rate(times), times=times, metadata=metadata)
 
     def unmapped(self, shaper: Shaper) -> list[str]:
-        """Names of its frames that a shaper's mapping does not know."""
+        """Names in its frames that a shaper's mapping does not know."""
         kinds = dict.fromkeys(frame.names for frame in self._frames)
         plans = (Plan(names, shaper.mapping) for names in kinds)
         return sorted({name for plan in plans for name in plan.unmapped})
 
 
 def _rate(times: np.ndarray) -> float:  # type: ignore[type-arg]
-    """The frames per second that most frames keep to; 60 for a take too short to tell."""
+    """The frames per second of most frames; 60 for a take that is too short."""
     steps = np.diff(times)
     return round(1.0 / float(np.median(steps)), 3) if steps.size else 60.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""New faces from some that have the same topology and controls, mixed by region."""
+"""Mixes new faces from faces with the same topology and controls, region by region."""
 
 from .compatible import check_compatible, difference
 from .hair import without_hair

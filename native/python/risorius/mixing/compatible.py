@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which faces may be mixed: those that differ in numbers alone."""
+"""Checks that faces can be mixed: they may differ only in numbers."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _TOPOLOGY = (
     "layout_normals",
 )
 _VALUES = ("texture_coordinates", "normals")
-_OTHERS = {  # layers that a mix takes from the first face, so all faces must have the same
+_OTHERS = {  # layers that a mix takes from the first face, so that all faces must have the same
     "blend_shape_channels": "drivers of blend shapes",
     "rbf_behavior": "RBF solvers",
     "rbf_behavior_ext": "poses of RBF solvers",
@@ -52,11 +52,11 @@ _OTHERS = {  # layers that a mix takes from the first face, so all faces must ha
     "machine_learned_behavior_ext": "operations and joints of neural networks",
     "joint_behavior_metadata": "kinds of joint rotations",
 }
-_QUATERNION = 1  # of a joint's rotation in joint_representations
+_QUATERNION = 1  # rotation in joint_representations
 
 
 def difference(one: Dna, other: Dna) -> str | None:
-    """Why two faces cannot be mixed, in a few words; None: they can.
+    """The reason why two faces cannot be mixed, in a few words; None if they can.
 
     Args:
         one: a face.
@@ -71,11 +71,11 @@ def difference(one: Dna, other: Dna) -> str | None:
 
 
 def check_compatible(faces: Sequence[Dna], names: Sequence[str]) -> None:
-    """Raises ValueError with the name of the first face that does not go with the first one.
+    """Raises ValueError with the name of the first face that cannot be mixed with the first one.
 
     Args:
         faces: at least one.
-        names: what they are called, such as their files.
+        names: their names in errors, such as file names.
     """
     for face, name in zip(faces[1:], names[1:], strict=True):
         why = difference(faces[0], face)
@@ -144,16 +144,16 @@ def _behavior(one: Dna, other: Dna) -> str | None:
 
 
 def alike(one: object, other: object) -> bool:
-    """Whether two parts of faces hold the same numbers and texts, all the way down.
+    """Whether two parts of faces hold the same numbers and texts at every depth.
 
     Args:
-        one: a part: an array, a text, a number, a list of parts, or what has parts as attributes.
-        other: of the same kind.
+        one: an array, a text, a number, a list of parts, or an object with parts as attributes.
+        other: a value of the same kind.
     """
     if isinstance(one, np.ndarray):
         return bool(one.tobytes() == np.asarray(other).tobytes())
     if isinstance(one, str | bytes | int | float):
-        return repr(one) == repr(other)  # of all its digits, and of no number too
+        return repr(one) == repr(other)  # compares all digits, and NaN as equal
     if isinstance(one, Sequence):
         assert isinstance(other, Sequence)
         return len(one) == len(other) and all(map(alike, one, other))
@@ -179,8 +179,8 @@ def turned_groups(dna: Dna) -> list[int]:
 
 
 def _turned_lists(dna: Dna) -> list[tuple[bytes, ...]]:
-    """Quaternions are multiplied in the order of the columns, so a mean of columns in two orders
-    would mean nothing: these lists have to be the same."""
+    """The lists of these groups, which must be equal: quaternions are multiplied in the order of
+    the columns, so that a mean of columns in two orders is meaningless."""
     groups = dna.joint_groups
     return [
         (g.lods.tobytes(), g.input_indices.tobytes(), g.output_indices.tobytes())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What controls do to joints in a mix: the mean of each row of the joint matrix."""
+"""The joint groups of a mix: the mean of each row of the joint matrix."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from ..author.geometry.skeleton import Doubles, Ints
 from .compatible import alike, turned_groups
 from .share import Share
 
-_DENSER = 4  # a group of several holds at most so many times their numbers
-Part = tuple[int, JointGroup]  # a parent's number, a group of its own
+_DENSER = 4  # a joined group holds at most this many times the numbers of its parts
+Part = tuple[int, JointGroup]  # index of a parent, and one of its groups
 
 
 def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     """The joint groups of a mix.
 
-    Groups of the same lists become one with these; otherwise those that share a joint become one
-    with the rows and columns of all, or several where that would hold far more numbers.
+    Groups with equal lists become one group with these lists. Otherwise groups that share a joint
+    are joined to one with the rows and columns of all, or to several if that would hold far more
+    numbers.
 
     Args:
-        parents: compatible ones.
-        share: of the joints.
+        parents: compatible faces.
+        share: share of the joints.
     """
     groups = [list(p.joint_groups) for p in parents]
     if share.is_whole and all(alike(groups[0], own) for own in groups[1:]):
@@ -33,7 +34,7 @@ def mixed_groups(parents: Sequence[Dna], share: Share) -> list[JointGroup]:
     lists = [[_lists(g) for g in own] for own in groups]
     if all(own == lists[0] for own in lists[1:]):
         return [_mean(row, share) for row in zip(*groups, strict=True)]
-    # Of joints that turn by quaternions the order of columns counts, which is the same in all.
+    # For joints turned by quaternions the order of columns counts; it is the same in all parents.
     turned = [turned_groups(p) for p in parents]
     out = [
         _mean([groups[p][g] for p, g in enumerate(row)], share) for row in zip(*turned, strict=True)
@@ -55,7 +56,7 @@ def _lists(group: JointGroup) -> tuple[bytes, ...]:
 
 
 def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
-    """One group of the mix, from groups of the parents with the same rows and columns."""
+    """One group of the mix, from the parents' groups with equal rows and columns."""
     first = groups[0]
     rows = np.asarray(first.output_indices, np.int64)
     values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))
@@ -69,14 +70,15 @@ def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
 
 
 def _weights(share: Share, parent: int, rows: Ints) -> Doubles:
-    """float64[n] of rows of a parent: places have its size, turns and sizes do not."""
+    """float64[n], weights of a parent's rows: translations are scaled, rotations and scales are
+    not."""
     joints = rows // 9
     return np.where(rows % 9 < 3, share.scaled[joints, parent], share.weights[joints, parent])
 
 
 def _together(parts: Sequence[Part]) -> list[list[Part]]:
-    """The groups that share joints, directly or by others; in the order of their first joints."""
-    above: dict[int, int] = {}  # joint -> one that it goes with
+    """The groups that share joints, directly or indirectly, in the order of their first joints."""
+    above: dict[int, int] = {}  # joint -> another joint of the same set
 
     def root(joint: int) -> int:
         while above[joint] != joint:
@@ -103,8 +105,8 @@ def _joints(group: JointGroup) -> list[int]:
 
 
 def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup]:
-    """One group of several, or some of which each has rows that the same parts have."""
-    levels_of: dict[int, int] = {}  # row -> how many levels have it
+    """Joins several groups to one, or to several whose rows come from the same parts."""
+    levels_of: dict[int, int] = {}  # row -> number of levels that have it
     of_row: dict[int, list[int]] = {}  # row -> numbers of the parts that have it
     used: list[_Source] = []
     for p, group in parts:
@@ -137,7 +139,7 @@ def _joined(parts: Sequence[Part], share: Share, levels: int) -> list[JointGroup
 class _Source(NamedTuple):
     parent: int
     group: JointGroup
-    place: dict[int, int]  # of its rows
+    place: dict[int, int]  # index of its rows
 
 
 def _block(
@@ -147,7 +149,7 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """The group of some rows, with all columns that the sources have; none without columns."""
+    """The group of some rows, with all columns of the sources; empty without columns."""
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

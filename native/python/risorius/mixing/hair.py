@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Hair of mixed faces: each person has meshes of its own, so a mix wears that of one parent.
+"""Hair of mixed faces: each person has meshes of its own, so a mix has the hair of one parent.
 
-Brows and lashes are alike on all people and are mixed as skin is; hair and beards are not.
+Brows and lashes have the same topology in all people and are mixed like skin; hair and beards are
+not.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from ..author.geometry.skeleton import Doubles, Ints
 from ..base.budget import BASE_BYTES, BYTES_PER_BYTE, Budget
 
 _OWN = re.compile(r"(hair|beard)_lod\d+_mesh")
-_NEAR = 4  # vertices of the skin that a vertex of hair goes with
-_CELLS = 1 << 22  # of distances that are held at once
+_NEAR = 4  # skin vertices that a vertex of hair follows
+_CELLS = 1 << 22  # distances that are held at once
 _BASE_STEPS = 1 << 28
 _STEPS_PER_BYTE = 256
 
 
 def hair_meshes(dna: Dna) -> list[int]:
-    """Numbers of the meshes that are one person's own: what ends the list and is named so.
+    """Numbers of the meshes of one person only: the last ones of the list, by their names.
 
     Args:
         dna: a face.
@@ -37,10 +38,10 @@ def hair_meshes(dna: Dna) -> list[int]:
 
 
 def without_hair(dna: Dna) -> Dna:
-    """The face without the meshes that are its own; itself where it has none.
+    """The face without its own hair meshes; the face itself if it has none.
 
     Args:
-        dna: a face; it stays as it is.
+        dna: a face; not changed.
     """
     own = hair_meshes(dna)
     if not own:
@@ -57,10 +58,10 @@ def without_hair(dna: Dna) -> Dna:
 
 
 def give_hair(out: Dna, leading: Dna) -> None:
-    """Let a mix wear one parent's hair, moved as the skin under it has been.
+    """Give a mix one parent's hair, moved like the skin under it.
 
     Args:
-        out: the mix without hair; is changed.
+        out: the mix without hair; changed in place.
         leading: the parent, with its hair.
     """
     own = hair_meshes(leading)
@@ -87,7 +88,7 @@ def give_hair(out: Dna, leading: Dna) -> None:
 
 
 def _skin(dna: Dna, listed: list[int]) -> int | None:
-    """The mesh of a level that hair stands on: the head, else the largest."""
+    """The mesh of a level under the hair: the head, else the largest mesh."""
     own = set(hair_meshes(dna))
     there = [m for m in listed if m not in own]
     heads = [m for m in there if "head" in dna.mesh_names[m].lower()]
@@ -95,7 +96,7 @@ def _skin(dna: Dna, listed: list[int]) -> int | None:
 
 
 def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles:
-    """float64[V, 3]: positions of hair, each moved as the skin nearest to it."""
+    """float64[V, 3]: positions of hair, each moved like the nearest skin."""
     points = np.asarray(mesh.positions, np.float64)
     near = nearest(points, skin, min(_NEAR, len(skin)), budget)
     square = ((points[:, None] - skin[near]) ** 2).sum(axis=2)
@@ -105,7 +106,7 @@ def _moved(mesh: Mesh, skin: Doubles, shift: Doubles, budget: Budget) -> Doubles
 
 
 def budget_of(dna: Dna) -> Budget:
-    """What mixing a face may take: as much as compiling it, see native/README.md.
+    """The budget for mixing a face: as much as compiling it, see native/README.md.
 
     Args:
         dna: the face.
@@ -115,16 +116,16 @@ def budget_of(dna: Dna) -> Budget:
 
 
 def nearest(points: Doubles, others: Doubles, count: int, budget: Budget) -> Ints:
-    """int64[n, count]: which of the others are nearest to each point, in any order.
+    """int64[n, count]: the points of `others` nearest to each point, in any order.
 
     Args:
         points: float64[n, 3].
         others: float64[m, 3].
-        count: how many of them, from 1 to m.
-        budget: of the face.
+        count: number of neighbours, from 1 to m.
+        budget: budget of the face.
 
     Raises:
-        BudgetError: more pairs than the face's size lets expect.
+        BudgetError: too many pairs for the face's size.
     """
     budget.work(len(points) * len(others) / 8, "vertices near others")
     lengths = (others**2).sum(axis=1)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Faces mixed: what is a number is the mean by weights, what is a name or a list stays.
+"""Mixes faces: numbers become weighted means, names and lists stay.
 
-Each vertex has a weight of each parent, from the shares of its regions; a joint has the mean of
-those of the vertices that hang on it. What a region takes from another face is brought to the size
-of the whole mix and to the region's place there: a brow of a tall face stays a brow on a small one.
+Each vertex has a weight for each parent, from the shares of its regions; a joint has the mean
+weights of its vertices. A region from another face is scaled to the size of the whole mix and moved
+to the region's place there: a tall face's brow also fits a small face.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from .share import Share, mean_of
 
 @dataclass
 class Mix:
-    """How much of each parent there is: on the whole, and otherwise in some regions.
+    """The shares of the parents: of the whole face, and different ones for some regions.
 
-    In a region the parents named there have their shares, and what these leave is as on the whole.
+    In a region the parents named there have their shares; the rest is divided as on the whole face.
     """
 
-    shares: Sequence[float]  # [P] of the whole; made to sum to 1
+    shares: Sequence[float]  # [P] of the whole face; normalised to sum 1
     regions: Mapping[str, Mapping[int, float]] = field(default_factory=dict)
 
     def whole(self) -> Doubles:
-        """float64[P]: the shares of the whole, with sum 1. Raises ValueError as table."""
+        """float64[P]: the shares of the whole face, with sum 1. Raises ValueError as table."""
         whole = np.array(self.shares, np.float64)
         if not len(whole) or not np.isfinite(whole).all() or (whole < 0).any() or not whole.sum():
             raise ArgumentError("shares from 0 on were expected, one of them above 0")
@@ -47,7 +47,7 @@ class Mix:
         """float64[regions, P]: the shares of each region; rows sum to 1.
 
         Raises:
-            ValueError: a share that is none, shares that are 0 together, or above 1 in a region.
+            ValueError: an invalid share, shares that are all 0, or above 1 in a region.
         """
         whole = self.whole()
         out = np.tile(whole, (len(REGIONS), 1))
@@ -71,20 +71,20 @@ class Mix:
 def mix_faces(
     parents: Sequence[Dna], mix: Mix, *, name: str | None = None, masks: Masks | None = None
 ) -> Dna:
-    """A face with the weighted mean of all that its parents have.
+    """A face with the weighted mean of its parents.
 
     Args:
-        parents: compatible ones, see check_compatible; they stay as they are.
-        mix: shares of them.
-        name: of the new face; None: that of the parent with the largest share.
-        masks: of the first parent's regions, where they are known already.
+        parents: compatible faces, see check_compatible; not changed.
+        mix: their shares.
+        name: name of the new face; None: from the parent with the largest share.
+        masks: masks of the first parent's regions, if known already.
 
     Returns:
-        Where all of it is one parent's, that parent's every bit. Metadata and hair are those of
+        If one parent has all shares, the result equals it in every bit. Metadata and hair come from
         the parent with the largest share.
 
     Raises:
-        ValueError: shares that make no sense, a region that the first parent does not have.
+        ValueError: invalid shares, a region that the first parent lacks.
     """
     table = mix.table()
     most = int(np.argmax(mix.whole()))
@@ -113,7 +113,7 @@ def mix_faces(
 
 
 class Places:
-    """Shares of points by what they have of the regions; without regions masks are not needed."""
+    """Shares of points by their regions; without regions no masks are needed."""
 
     def __init__(self, parents: Sequence[Dna], mix: Mix, masks: Masks) -> None:
         self.table = mix.table()
@@ -125,14 +125,14 @@ class Places:
         skin = masks.skin
         positions = [np.asarray(p.meshes[skin].positions, np.float64) for p in parents]
         part = masks.meshes[skin]
-        # Of shares whose sum is 1 but for rounding.
+        # Shares sum to 1 only up to rounding.
         face = (1 - part[:, REGIONS.index("neck")] - part[:, REGIONS.index("skull")]).clip(0)
         mixed = np.asarray(sum(g * p for g, p in zip(self.whole, positions, strict=True)))
         size = _spread(mixed, face)
-        # Where two regions meet is what has to fit: rims lie upon each other.
+        # Regions must fit at their borders, so that their rims coincide.
         rims = part * (1 - part) + 1e-3 * part
         sizes = [[size / _spread(p, face) for _ in REGIONS] for p in positions]
-        for outer in ("neck", "skull"):  # what is round the face has the size of its rim
+        for outer in ("neck", "skull"):  # the outer regions have the size of their rim at the face
             at = REGIONS.index(outer)
             for own, p in zip(sizes, positions, strict=True):
                 own[at] = _spread(mixed, rims[:, at]) / _spread(p, rims[:, at])
@@ -141,17 +141,17 @@ class Places:
         self.shifts = _middles(mixed, rims) - self.sizes[:, :, None] * middles
 
     def of_mesh(self, mesh: int) -> Share:
-        """Of the vertices of a mesh.
+        """The shares of a mesh's vertices.
 
         Args:
-            mesh: its number.
+            mesh: its index.
         """
         if not self.own.any():
             return self._everywhere(len(self._first.meshes[mesh].positions))
         return self._of(self._masks.meshes[mesh])
 
     def of_joints(self) -> Share:
-        """Of the joints."""
+        """The shares of the joints."""
         if not self.own.any():
             return self._everywhere(len(self._first.joint_names))
         return self._of(_joint_masks(self._first, self._masks))
@@ -161,7 +161,7 @@ class Places:
         return Share(rows, rows, np.zeros((count, 3)))
 
     def _of(self, masks: Doubles) -> Share:
-        """Of points that have so much of the regions: float64[n, regions], rows sum to 1."""
+        """Shares of points by their masks: float64[n, regions], rows sum to 1."""
         parts = masks * self.own
         rest = (1 - parts.sum(axis=1, keepdims=True)).clip(0) * self.whole
         inside = parts @ self.table
@@ -193,11 +193,11 @@ def _descriptor(
 
 
 def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
-    """A mesh between those of the parents.
+    """The mean of the parents' meshes.
 
     Args:
-        parents: of one topology.
-        share: of its vertices.
+        parents: meshes of one topology.
+        share: share of its vertices.
     """
     first, weights = parents[0], share.weights
     out = copy.copy(first)
@@ -213,7 +213,8 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
         setattr(out, values, mean_of([getattr(m, values) for m in parents], weights[vertex]))
     mixed = np.asarray(out.normals, np.float64)
     length = np.linalg.norm(mixed, axis=1, keepdims=True)
-    # Normals that all have, or one parent alone, stay as they are, also if they are not 1 long.
+    # Normals that all parents share, or of one parent only, stay unchanged, even if not of length
+    # 1.
     alone = (weights == 1).any(axis=1).all()
     if not alone and not all(np.array_equal(first.normals, m.normals) for m in parents[1:]):
         out.normals = mixed / np.where(length > 0, length, 1)
@@ -225,7 +226,7 @@ def _mesh(parents: Sequence[Mesh], share: Share) -> Mesh:
 
 
 def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget]:
-    """Blend shapes of all vertices that one of the parents moves."""
+    """Blend shapes over all vertices that some parent moves."""
     own = [
         {int(t.blend_shape_channel_index): t for t in mesh.blend_shape_targets} for mesh in parents
     ]
@@ -253,7 +254,7 @@ def _targets(parents: Sequence[Mesh], weights: Doubles) -> list[BlendShapeTarget
 
 
 def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
-    """Skin weights; where the parents have the same ones, these."""
+    """Skin weights; unchanged if all parents have the same."""
     fields = ("skin_offsets", "skin_joint_indices", "skin_weights")
     if all(
         np.array_equal(getattr(parents[0], name), getattr(mesh, name))
@@ -268,7 +269,7 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
     keys, place = np.unique(keys, return_inverse=True)
     weight = np.bincount(place.ravel(), weights=np.concatenate(parts))
     vertex, joint = keys >> 16, keys & 0xFFFF
-    # The smallest beyond what a parent has at most are left out.
+    # The smallest weights beyond the parents' largest number of influences are dropped.
     most = max(int(mesh.maximum_influence_per_vertex) for mesh in parents)
     first = np.searchsorted(vertex, vertex)
     rank = np.zeros(len(keys), np.int64)
@@ -284,11 +285,11 @@ def _skin(out: Mesh, parents: Sequence[Mesh], weights: Doubles) -> None:
 
 
 def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
-    """float64[J, regions]: of each joint the mean of what hangs on it, at the finest level.
+    """float64[J, regions]: the mean mask of each joint's vertices, at the finest level.
 
     Args:
         dna: the first parent.
-        masks: of its regions.
+        masks: masks of its regions.
     """
     count = len(dna.joint_names)
     sums, held = np.zeros((count, len(REGIONS))), np.zeros(count)
@@ -300,19 +301,21 @@ def _joint_masks(dna: Dna, masks: Masks) -> Doubles:
         held += np.bincount(holds, weights=weight, minlength=count)
         for region, part in enumerate(masks.meshes[m].T):
             sums[:, region] += np.bincount(holds, weights=weight * part[vertex], minlength=count)
-    for joint in reversed(sk.parent_order(dna)):  # a joint without skin is as those below it
+    # a joint without vertices takes the mask of its children.
+    for joint in reversed(sk.parent_order(dna)):
         parent = int(dna.joint_parents[joint])
         if parent != joint and held[parent] < 1e-6 and held[joint] > 0:
             sums[parent] += 1e-9 * sums[joint] / held[joint]
             held[parent] += 1e-9
     rest = np.eye(len(REGIONS))[-1]
     out = np.where(held[:, None] > 0, sums / np.maximum(held, 1e-30)[:, None], rest)
-    # What is one region's stays one region's, whatever sums make of 1.
+    # Values of exactly one region are kept exact in spite of rounding.
     return np.where(np.abs(out - np.rint(out)) < 1e-9, np.rint(out), out)
 
 
 def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
-    """Joints lie at the mean of where they lie in the world, turned by the mean of the turns."""
+    """Neutral pose: joints at the mean of their world positions, with the mean of their
+    rotations."""
     weights = share.weights
     shifts = [np.asarray(p.neutral_joint_translations, np.float64) for p in parents]
     turns = [np.asarray(p.neutral_joint_rotations, np.float64) for p in parents]
@@ -322,7 +325,8 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
     places = [sk.world_matrices(p, rest)[:, :3, 3] for p in parents]
     world = share.places(places)
     local = mean_of(shifts, weights)
-    # Where nothing is moved or turned, the mean of the places is the mean of the shifts.
+    # Without moved regions and different rotations, the mean of the positions is the mean of the
+    # translations.
     alike = all(np.array_equal(turns[0], t) for t in turns[1:]) and not share.shift.any()
     frames = np.tile(np.eye(4), (count, 1, 1))
     matrices = sk.rotation_matrices(Convention.of(out), rotations)
@@ -339,7 +343,7 @@ def _neutral_pose(out: Dna, parents: Sequence[Dna], share: Share) -> None:
 
 
 def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
-    """float64[J, 3]: the mean of turns, as quaternions where they differ."""
+    """float64[J, 3]: the mean of rotations, as quaternions where they differ."""
     convention = Convention.of(out)
     rows = turns[0].copy()
     for joint in range(len(rows)):
@@ -359,7 +363,7 @@ def _turns(out: Dna, turns: Sequence[Doubles], weights: Doubles) -> Doubles:
 
 
 def _maps(out: Dna, parents: Sequence[Dna], shares: Doubles) -> None:
-    """Slopes and cuts of what drives animated maps."""
+    """Slopes and cuts of the conditional table of animated maps."""
     maps = copy.copy(parents[0].animated_maps)
     conditionals = copy.copy(maps.conditionals)
     own = [p.animated_maps.conditionals for p in parents]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Textures of mixed faces: those of the parents laid over each other, where all have them.
+"""Textures of mixed faces: the parents' textures blended, if all have them.
 
-Skin has one tone: its pictures are mixed by the shares of the whole, also where a region has
-others; those of eyes by the shares of their region. Only pictures that this package wrote are
-mixed, and those of hair are not, as hair is one parent's own; of others the leading parent's file
-is taken as it is.
+Skin has one tone: its textures are mixed by the shares of the whole face, even if a region has
+others; textures of eyes use the shares of their region. Only images that this package wrote are
+mixed, and not those of hair, which comes from one parent; for other images the leading parent's
+file is used.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ WHY = {
     "format": "Risorius mixes its own kind of PNG alone",
     "size": "the faces have them in different sizes",
 }
-"""Why pictures are the leading parent's own."""
+"""Reasons why images come from the leading parent alone."""
 _KEY = "texture:"
-_MOST_BYTES = 1 << 28  # of a picture
-_MASKS = "*_msk.png"  # of wrinkles, which are known by their names alone
+_MOST_BYTES = 1 << 28  # largest image in bytes
+_MASKS = "*_msk.png"  # masks of wrinkles, which are recognised only by their names
 
 
 def texture_folder(path: Path) -> Path:
-    """Where the textures of a DNA file lie.
+    """The folder of a DNA file's textures.
 
     Args:
-        path: of the file.
+        path: path of the file.
     """
     return path.with_name(path.stem + "_textures")
 
@@ -51,19 +51,19 @@ def texture_folder(path: Path) -> Path:
 def mix_textures(
     parents: Sequence[Dna], paths: Sequence[Path], mix: Mix, masks: Masks
 ) -> tuple[dict[str, bytes], dict[str, str]]:
-    """The textures that the leading parent's metadata name.
+    """The textures named in the leading parent's metadata.
 
     Args:
-        parents: compatible ones.
+        parents: compatible faces.
         paths: of their files.
         mix: their shares.
-        masks: of the first one's regions.
+        masks: masks of the first one's regions.
 
     Returns:
-        File name -> bytes; and of those that are the leading parent's own, name -> why, see WHY.
+        File name -> bytes; and for images of the leading parent alone: name -> reason, see WHY.
 
     Raises:
-        BudgetError: pictures that say in a few bytes that they are huge.
+        BudgetError: small files that declare huge images.
     """
     whole = mix.whole()
     most = int(whole.argmax())
@@ -73,7 +73,7 @@ def mix_textures(
     taken: set[str] = set()
     for key, name in parents[most].metadata.items():
         mesh = key.split(":")[1] if key.startswith(_KEY) and key.count(":") >= 2 else ""
-        # A second name for one file of some system is left out as one that leads elsewhere is.
+        # Skips a second name for one file on some system, and a name that leads to another folder.
         if mesh not in meshes or not is_file_name(name) or folded(name) in taken:
             continue
         data = [_data(p, path, key) for p, path in zip(parents, paths, strict=True)]
@@ -95,14 +95,14 @@ def mix_textures(
 
 
 def check_room(path: Path, pictures: Iterable[str]) -> None:
-    """Refuse to write over pictures that belong to no face of this name.
+    """Refuse to overwrite images that do not belong to a face of this name.
 
     Args:
-        path: of the new DNA file; where it is there, its pictures may be replaced with it.
-        pictures: file names, which the parents' metadata have chosen.
+        path: path of the new DNA file; if it exists, its images may be replaced too.
+        pictures: file names from the parents' metadata.
 
     Raises:
-        ArgumentError: the file is new, and a picture is there; names it.
+        ArgumentError: the file is new but an image exists; the error names it.
     """
     for name in () if path.exists() else pictures:
         there = texture_folder(path) / name
@@ -114,7 +114,7 @@ def check_room(path: Path, pictures: Iterable[str]) -> None:
 
 
 def _shares(mix: Mix, masks: Masks, mesh: int) -> Doubles:
-    """float64[P]: of the pictures of a mesh; what is rigid has those of its region."""
+    """float64[P]: shares of a mesh's textures; a rigid mesh has those of its region."""
     part = masks.meshes[mesh] if mix.regions else np.zeros((0, 1))
     rigid = len(part) > 0 and (part == part[0]).all() and part[0].max() == 1
     return np.asarray(mix.table()[int(part[0].argmax())] if rigid else mix.whole())
@@ -126,7 +126,7 @@ def _data(parent: Dna, path: Path, key: str) -> bytes | None:
 
 
 def _bytes(path: Path, name: str) -> bytes | None:
-    """A file beside a DNA file or in its folder of textures, if it is there."""
+    """A file in the folder of a DNA file or in its folder of textures, if it exists."""
     for folder in (texture_folder(path), path.parent):
         with contextlib.suppress(OSError, ReadingError):
             return read_file(folder / name, _MOST_BYTES, found=True)
@@ -134,7 +134,7 @@ def _bytes(path: Path, name: str) -> bytes | None:
 
 
 def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
-    """Why pictures of the parents do not go together; empty where they do."""
+    """The reason why the parents' images do not fit together; empty if they do."""
     counted = [found for found, share in zip(data, shares, strict=True) if share > 0]
     if None in counted:
         return "missing"
@@ -148,7 +148,7 @@ def _why_not(data: Sequence[bytes | None], shares: Doubles) -> str:
 
 
 def _mixed(data: Sequence[bytes | None], shares: Doubles) -> bytes:
-    """A picture of the parents' pictures, which go together; empty where one is damaged."""
+    """The blend of the parents' matching images; empty if one is damaged."""
     counted = {i: data[i] or b"" for i, share in enumerate(shares) if share > 0}
     if len(counted) == 1:
         return next(iter(counted.values()))

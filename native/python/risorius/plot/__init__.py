@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rig as pictures: the joint matrix, the levels of detail, the face with its joints, the sizes.
+"""Draws a rig: the joint matrix, the levels of detail, the face with its joints, the sizes.
 
 Dna + bytes of the file --facts--> Facts --draw_*--> figures --page | sheet--> .html | .png
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint matrix of one face twice: before an edit and after it."""
+"""The joint matrix of one face before and after an edit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def render(before: Facts, after: Facts, kind: str, dpi: int) -> bytes:
         before: the face with its old joint groups.
         after: with the new ones.
         kind: "png" or "svg".
-        dpi: of the images.
+        dpi: resolution of the images.
 
     Returns:
         The bytes of the picture.
@@ -63,7 +63,7 @@ def _draw_head(figure: SubFigure, facts: Facts) -> None:
     title = textwrap.shorten(facts.title, 60, placeholder="...")
     figure.text(edge, 0.66, title, fontsize=22, fontweight="bold", va="center")
     figure.text(
-        edge, 0.24, f"{facts.file_name} | what moves the joints, before and after regrouping",
+        edge, 0.24, f"{facts.file_name} | joint matrix before and after regrouping",
         fontsize=10.5, color=MUTED, va="center",
     )  # fmt: skip
     found = list(facts.region_counts())

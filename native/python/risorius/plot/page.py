@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All four drawings as one page that needs nothing but itself."""
+"""All four drawings as one self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     """The page as HTML in UTF-8.
 
     Args:
-        facts: of the face.
-        lod: that is drawn, from 0.
-        dpi: dots an inch of its pictures.
+        facts: facts of the face.
+        lod: the level to draw, from 0.
+        dpi: dots per inch of its pictures.
     """
     bars = 0.75 + 0.3 * len(facts.layers)
     with settings():
@@ -56,15 +56,15 @@ def section(
     draw: Callable[[Canvas], None],
     after: str = "",
 ) -> str:
-    """A heading, a caption, the drawing `height` inches high, and what follows it.
+    """A heading, a caption, the drawing `height` inches high, and optional HTML after it.
 
     Args:
-        name: the section's identifier.
+        name: the section's id.
         title: the heading.
         caption: a sentence or two under it.
-        height: of the drawing, inches.
-        dpi: of its pictures.
-        draw: fills the canvas.
+        height: height of the drawing, inches.
+        dpi: resolution of its pictures.
+        draw: draws on the canvas.
         after: HTML behind the drawing.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=dpi)
@@ -77,7 +77,7 @@ def section(
 
 
 def _svg(figure: Figure, name: str, title: str) -> str:
-    """A drawing as inline SVG whose inks follow the page's theme."""
+    """A drawing as inline SVG whose colours follow the page's theme."""
     out = io.StringIO()
     figure.savefig(out, format="svg", dpi=figure.dpi, metadata={"Date": None, "Creator": None})
     text = out.getvalue()
@@ -85,11 +85,11 @@ def _svg(figure: Figure, name: str, title: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     for ink, variable in _VARIABLES.items():
         text = text.replace(ink, f"var({variable})")
-    # Drawings on one page must not share the names of their parts.
+    # Drawings on one page must not share ids.
     text = re.sub(r'\bid="', f'id="{name}-', text)
     text = re.sub(r'href="#', f'href="#{name}-', text)
     text = text.replace("url(#", f"url(#{name}-")
-    # The page gives the size; the viewBox keeps the shape.
+    # The page sets the size; the viewBox keeps the aspect ratio.
     text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
     text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
     return text.replace("<svg", f'<svg role="img" aria-label="{html.escape(title)}"', 1)
@@ -118,9 +118,9 @@ def document(facts: Facts, sections: str, links: Sequence[tuple[str, str]]) -> s
     """The whole page.
 
     Args:
-        facts: of the face.
-        sections: HTML of what `section` made.
-        links: identifiers of the sections and the words that lead there.
+        facts: facts of the face.
+        sections: HTML from `section`.
+        links: ids of the sections and the texts of their links.
     """
     title = html.escape(facts.title)
     legend = "".join(

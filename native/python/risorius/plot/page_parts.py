@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The page's style and the few lines that enlarge a picture."""
+"""The page's style, and the script that enlarges a picture."""
 
 STYLE = """
 :root { color-scheme: light dark; --ink: #1d232b; --muted: #66707d; --rule: #d4dae1;

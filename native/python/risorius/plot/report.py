@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What was made from expressions, and how near it comes: one page that needs nothing but itself."""
+"""The report of a rig made from expressions and its accuracy: one self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from .page import WIDTH, document, section
 
 @dataclass(frozen=True)
 class LevelRow:
-    """What the page tells of a level of detail."""
+    """The page's data on a level of detail."""
 
     joints: int
     vertices: int
     deltas: int
-    size: int  # bytes of a file with this level alone
-    microseconds: float  # of a pose asked for from Python, median
-    rms: float  # mm, by joints alone
-    largest: float  # mm, by joints alone
-    with_shapes: float  # mm, the largest
+    size: int  # bytes of a file with only this level
+    microseconds: float  # median time of a pose requested from Python
+    rms: float  # mm, with joints only
+    largest: float  # mm, with joints only
+    with_shapes: float  # mm, largest error with blend shapes
 
 
 @dataclass(frozen=True)
 class ExpressionRow:
-    """What the page tells of an expression at LOD 0; millimetres."""
+    """The page's data on an expression at LOD 0, in millimetres."""
 
     name: str
     motion: float
@@ -53,13 +53,13 @@ def render(
     """The page as HTML in UTF-8.
 
     Args:
-        facts: of the face that was made.
-        levels: of each level of detail.
-        rows: of each expression.
-        worst: the expressions that are drawn, by joints alone.
-        dpi: dots an inch of its pictures.
+        facts: facts of the new face.
+        levels: one row per LOD.
+        rows: one row per expression.
+        worst: the expressions to draw, with joints only.
+        dpi: dots per inch of its pictures.
     """
-    # What stands out alone would leave all else without colour: it is beyond the end of the scale.
+    # A single large error would leave everything else colourless, so it may exceed the scale.
     most = 1.25 * float(np.median([e.largest for e in worst] or [0.05]))
     lines = [
         f"{level.joints:,} joints, {level.vertices:,} vertices\n"
@@ -69,8 +69,8 @@ def render(
     with settings():
         sections = [
             section("errors", "Where joints alone are off",
-                    "The expressions with the largest errors at LOD 0, each at 1 and in the form "
-                    "that was asked for; what blend shapes add is not counted.",
+                    "The expressions with the largest errors at LOD 0, each at 1 and in its "
+                    "requested form; blend shape deltas are not counted.",
                     draw_errors.height(len(worst), WIDTH), dpi,
                     lambda canvas: draw_errors.draw(canvas, facts.dna, worst, most, dpi),
                     after=_expressions(rows)),

@@ -17,7 +17,7 @@ from .content.regions import COLORS
 from .drawing import draw_face, draw_lods, draw_matrix, draw_sizes
 from .drawing.paper import INK, MUTED, RULE, Canvas, settings
 
-# Inches. The face is as wide as two views of a head at the height of the matrix.
+# Inches. The face is as wide as two views of a head with the height of the matrix.
 WIDTH, HEAD, UPPER, LOWER = 22.0, 1.15, 9.6, 5.9
 LEFT = 10.8
 _EDGE = 0.35
@@ -27,9 +27,9 @@ def render(facts: Facts, lod: int, dpi: int) -> bytes:
     """The sheet as the bytes of a PNG file.
 
     Args:
-        facts: of the face.
-        lod: that is drawn, from 0.
-        dpi: dots an inch.
+        facts: facts of the face.
+        lod: the level to draw, from 0.
+        dpi: dots per inch.
     """
     with settings():
         figure = Figure(figsize=(WIDTH, HEAD + UPPER + LOWER), dpi=dpi, facecolor="white")
@@ -57,7 +57,7 @@ def split(
     """Parts of a figure from top to bottom, or from left to right.
 
     Args:
-        figure: or a part of one.
+        figure: a figure or a part of one.
         rows: heights, in any unit.
         columns: widths, in any unit.
     """
@@ -69,7 +69,7 @@ def split(
 
 
 def _draw_head(figure: SubFigure, facts: Facts) -> None:
-    """Who this is, and the legend of regions."""
+    """The character's name and the legend of regions."""
     edge = _EDGE / WIDTH
     title = textwrap.shorten(facts.title, 60, placeholder="...")
     figure.text(edge, 0.64, title, fontsize=22, fontweight="bold", va="center")
@@ -90,7 +90,7 @@ def _draw_head(figure: SubFigure, facts: Facts) -> None:
 
 
 def panel(figure: SubFigure, title: str, caption: str, width: float, height: float) -> Canvas:
-    """A heading with its caption over a place to draw in.
+    """A heading with its caption above a canvas.
 
     Args:
         figure: the part of the sheet to fill.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Finds neutral and extreme of each control in a take.
+"""Finds the neutral and extreme value of each control in a take.
 
-A control is left as captured where the take does not prove its range: what hardly moves, what is
-never at rest, what does not come near its extreme. Both sides of a face get the same range.
+A control stays as captured if the take does not prove its range: if it hardly moves, is never at
+rest, or does not come near its extreme. Both sides of a face get the same range.
 """
 
 from __future__ import annotations
@@ -21,34 +21,34 @@ from .remap import WIDTHS, Learned, Range, Ranges, require_untouched
 Doubles = npt.NDArray[np.float64]
 
 MOST_GAIN = 1.6
-"""A range that would be stretched more than this was not shown by the take."""
+"""A range that needs a larger gain was not shown by the take."""
 SHORTEST = 2.0
-"""Seconds that a take must last at least."""
-_LID_GAIN = 2.0  # of lids: everybody shuts them, so a low peak is a weak capture
-_LEAST_RANGE = 0.15  # below this a control hardly moves
-_LEAST_OVER_NOISE = 8.0  # standard deviations of its noise that a control must move by
-_REST_SHARE = 10  # percent of the frames in which a control is at rest at least
-_HIGHEST_REST = 0.25  # a control whose lowest tenth lies above this is never at rest
-_SPIKE = 0.05  # seconds: what is shorter is no peak
-_WIDEST = 4  # frames to either side: bounds the memory for takes of many frames a second
-_NEAR = 0.8  # share of the highest peak from which on a peak is one to the extreme
-_LOW_PEAKS = 25  # percent of these peaks that may stay below 1
-_LOW_BLINKS = 10  # of lids: a blink that is not shut is what one sees
+"""Shortest take in seconds."""
+_LID_GAIN = 2.0  # of lids: everybody shuts them, so that a low peak means a weak capture
+_LEAST_RANGE = 0.15  # a smaller range counts as hardly moving
+_LEAST_OVER_NOISE = 8.0  # least range in standard deviations of the noise
+_REST_SHARE = 10  # least percentage of frames in which a control must be at rest
+_HIGHEST_REST = 0.25  # a control whose lowest tenth is higher is never at rest
+_SPIKE = 0.05  # seconds: shorter peaks are ignored
+_WIDEST = 4  # frames to either side: limits the memory for high frame rates
+_NEAR = 0.8  # share of the highest peak from which a peak counts as extreme
+_LOW_PEAKS = 25  # percentage of these peaks that may stay below 1
+_LOW_BLINKS = 10  # of lids: an incomplete blink is noticeable
 _CEILING = 0.85  # of a performance: at least half of the peaks reach this share of the highest
-_LEAST_PEAKS = 3  # and there are this many
-_SAME = 0.7  # sides whose extremes differ by less both get the lesser one
+_LEAST_PEAKS = 3  # least number of peaks
+_SAME = 0.7  # if the extremes of the sides differ more, both get the smaller one
 _PREFIX = "CTRL_expressions."
 
 
 @dataclass
 class _Measured:
-    """What the curve of a control is like.
+    """Properties of a control's curve.
 
     Attributes:
         neutral, extreme: values.
-        noise: standard deviation of what changes from frame to frame without a direction.
+        noise: standard deviation of random changes from frame to frame.
         rests: whether it is near 0 for some time.
-        has_ceiling: whether its peaks stop at one height.
+        has_ceiling: whether its peaks end at one height.
     """
 
     neutral: float
@@ -59,20 +59,20 @@ class _Measured:
 
 
 def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN) -> Ranges:
-    """The ranges of the person of a take.
+    """The ranges of the person in a take.
 
     Args:
-        clip: raw controls, as captured: without gain, smoothing or ranges.
-        performance: the take shows acting, not all extremes one after another: only controls
-            whose peaks stop at one height again and again are believed to reach their extreme.
-        most_gain: stretch at most so much, 1 to 4; lids to 2 at least.
+        clip: raw controls as captured, without gain, smoothing or ranges.
+        performance: the take shows acting, not one extreme after another: a control counts only if
+            its peaks repeatedly end at one height.
+        most_gain: largest gain, 1 to 4; for lids at least 2.
 
     Returns:
-        Ranges; its controls in the clip's order, head and gaze angles left out.
+        Ranges with the controls in the clip's order, without angles of head and gaze.
 
     Raises:
-        ArgumentError: a take shorter than SHORTEST, no control of a face in it, a value that is not
-            finite, a clip whose ranges were taken out, a gain outside 1 to 4.
+        ArgumentError: a take shorter than SHORTEST, no control of a face, a value that is not
+            finite, a clip whose ranges were removed before, a gain outside 1 to 4.
     """
     if not 1.0 <= most_gain <= 4.0:
         raise ArgumentError(f"a largest gain of 1 to 4 was expected, found {most_gain:g}")
@@ -102,7 +102,8 @@ def learn(clip: Clip, *, performance: bool = False, most_gain: float = MOST_GAIN
 
 
 def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
-    """A curve of one control. Args: curve  float64[frames]; rate  frames a second."""
+    """Measure one control. Args: curve  float64[frames]; rate  frames per second; name  its
+    name."""
     calm = _without_spikes(curve, rate)
     lowest = float(np.percentile(calm, _REST_SHARE))
     neutral = min(max(lowest, 0.0), _HIGHEST_REST)
@@ -123,7 +124,7 @@ def _measure(curve: Doubles, rate: float, name: str) -> _Measured:
 
 
 def _without_spikes(curve: Doubles, rate: float) -> Doubles:
-    """The median of the frames around each frame, over _SPIKE seconds, 3 frames at least."""
+    """The median around each frame over _SPIKE seconds, at least 3 frames."""
     half = min(max(1, round(0.5 * _SPIKE * rate)), _WIDEST)
     padded = np.pad(curve, half, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1)
@@ -132,7 +133,7 @@ def _without_spikes(curve: Doubles, rate: float) -> Doubles:
 
 
 def _peaks(curve: Doubles, neutral: float) -> Doubles:
-    """The highest values of the times in which a curve is above half of its way."""
+    """The maximum of each interval in which a curve is above half of its range."""
     above = curve - neutral > 0.5 * (curve.max(initial=neutral) - neutral)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], above, [False]]).astype(np.int8)))
     pairs = edges.reshape(-1, 2)
@@ -140,10 +141,10 @@ def _peaks(curve: Doubles, neutral: float) -> Doubles:
 
 
 def _together(pair: list[_Measured]) -> _Measured:
-    """One measurement for both sides: a face that is captured evenly stays even."""
+    """One measurement for both sides, so that an even face stays even."""
     extremes = [side.extreme for side in pair]
     least, most = min(extremes), max(extremes)
-    # Sides that go equally far both reach 1. Else one side was not taken to its extreme.
+    # If both sides go equally far, both reach 1. Otherwise one side was not taken to its extreme.
     return _Measured(
         float(np.mean([side.neutral for side in pair])),
         least if least >= _SAME * most else most,
@@ -154,7 +155,7 @@ def _together(pair: list[_Measured]) -> _Measured:
 
 
 def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> Learned:
-    """The range of a control, and why it is not used where it is not."""
+    """The range of a control, or the reason why it is not used."""
     moved = found.extreme - found.neutral
     gain = max(most_gain, _LID_GAIN) if _is_lid(name) else most_gain
     reasons = {
@@ -166,7 +167,7 @@ def _judge(name: str, found: _Measured, performance: bool, most_gain: float) -> 
         "its peaks differ, so none is an extreme": performance and not found.has_ceiling,
         "does not come near its extreme": moved * gain < 1.0 or moved > WIDTHS[1],
     }
-    # Rounded down: a peak is never left a little below 1.
+    # Rounded down, so that a peak never ends a little below 1.
     range_ = Range(round(found.neutral, 3), float(np.floor(found.extreme * 1e3)) / 1e3)
     return Learned(range_, next((reason for reason, holds in reasons.items() if holds), ""))
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Values of controls by the ranges of a person: neutral becomes 0, extreme becomes 1.
+"""Maps values of controls by the ranges of a person: neutral becomes 0, extreme becomes 1.
 
     share = (value - neutral) / (extreme - neutral)         0 to 1
     result = share * (width + (1 - width) * share)          width = extreme - neutral
 
-The slope is 1 at the neutral: what trembles at rest trembles no more than it was captured.
+The slope is 1 at neutral, so that noise at rest is not amplified.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from ..base.errors import ArgumentError
 Floats = npt.NDArray[np.float32]
 
 NEUTRALS = (0.0, 0.9)
-"""The lowest and highest neutral that a range may have."""
+"""Limits of a range's neutral value."""
 WIDTHS = (0.1, 1.9)
-"""The smallest and largest difference of extreme and neutral; wider ones would not ascend."""
+"""Limits of extreme minus neutral; beyond them the mapping would not be ascending."""
 
 
-_APPLIED = "range"  # in the metadata of a clip: whose ranges were taken out of it
-_CAPTURES = ("live_link_face", "csv", "json")  # kinds of files that captures are in
+_APPLIED = "range"  # key in a clip's metadata for the source of removed ranges
+_CAPTURES = ("live_link_face", "csv", "json")  # kinds of files with captures
 
 
 def is_captured(clip: Clip) -> bool:
-    """Whether a clip has values as a capture app gives them: no speech, nothing ranged before."""
+    """Whether a clip holds captured values: not speech, and without removed ranges."""
     is_capture = clip.metadata.get("kind") in _CAPTURES or "subject" in clip.metadata
     return is_capture and _APPLIED not in clip.metadata
 
 
 def require_untouched(clip: Clip) -> None:
-    """Raises: ArgumentError, where ranges were taken out of a clip before."""
+    """Raises: ArgumentError: ranges were removed from the clip before."""
     if _APPLIED in clip.metadata:
         raise ArgumentError(
             "a capture as it came was expected, found one whose range was taken out before: "
@@ -47,24 +47,24 @@ def require_untouched(clip: Clip) -> None:
 
 
 class Range(NamedTuple):
-    """Of one control."""
+    """The range of one control."""
 
     neutral: float
-    """The value of a face at rest, NEUTRALS."""
+    """The value of a face at rest, within NEUTRALS."""
     extreme: float
-    """The value at which the face can go no further; the neutral and WIDTHS."""
+    """The largest possible value; neutral plus a width within WIDTHS."""
 
     @property
     def gain(self) -> float:
-        """By how much the way from neutral to extreme is stretched; 1 leaves it as it is."""
+        """The factor that maps the range to 1; 1 means no change."""
         return 1.0 / (self.extreme - self.neutral)
 
     def calibrated(self) -> Range:
-        """The range of values from which the face at rest was taken away: see process.calibrate."""
+        """The range after the face at rest was subtracted, see process.calibrate."""
         return Range(0.0, (self.extreme - self.neutral) / (1.0 - self.neutral))
 
     def trouble(self) -> tuple[str, str] | None:
-        """(field, what was expected and found) where the numbers make no range; None: all well."""
+        """(field, expected and found value) of an invalid range; None if it is valid."""
         low, high = NEUTRALS
         if not low <= self.neutral <= high:
             return "neutral", f"{low:g} to {high:g} was expected, found {self.neutral:g}"
@@ -78,12 +78,12 @@ class Range(NamedTuple):
 
 
 class Learned(NamedTuple):
-    """Measurements of one control in a take."""
+    """The measurement of one control in a take."""
 
     range: Range
-    """As found, also where it is left alone."""
+    """The measured range, even if it is not used."""
     reason: str = ""
-    """Why the control is left as captured; "" where its range is used."""
+    """Why the control stays as captured; "" if its range is used."""
 
 
 @dataclass(frozen=True)
@@ -91,28 +91,28 @@ class Ranges:
     """The ranges of a person.
 
     Attributes:
-        controls: raw control, as a DNA spells it -> what was learned of it.
-        source: the take that they were learned from.
+        controls: raw control in the spelling of a DNA -> its measurement.
+        source: the take in which they were measured.
     """
 
     controls: Mapping[str, Learned] = field(default_factory=dict)
     source: str = ""
 
     def __post_init__(self) -> None:
-        """Raises: ArgumentError for a range that is used and makes no sense."""
+        """Raises: ArgumentError: a used range is invalid."""
         for name, range_ in self.used().items():
             if trouble := range_.trouble():
                 raise ArgumentError(f"{name}: {trouble[0]}: {trouble[1]}")
 
     def used(self) -> dict[str, Range]:
-        """The ranges of the controls that are changed."""
+        """The ranges of the controls that change."""
         return {name: found.range for name, found in self.controls.items() if not found.reason}
 
     def apply(self, clip: Clip) -> Clip:
-        """A clip of raw controls with the ranges taken out; other curves keep their bits.
+        """A clip of raw controls with the ranges removed; other curves keep their bits.
 
         Raises:
-            ArgumentError: ranges were taken out of the clip before.
+            ArgumentError: ranges were removed from the clip before.
         """
         require_untouched(clip)
         remap = Remap(clip.names, self.used())
@@ -121,22 +121,22 @@ class Ranges:
         return clip.replaced(curves=remap(clip.curves.T).T, metadata=self.noted(clip.metadata))
 
     def noted(self, metadata: Mapping[str, str]) -> dict[str, str]:
-        """Metadata of a clip out of which these ranges are taken."""
+        """Metadata of a clip from which these ranges are removed."""
         return {**metadata, _APPLIED: self.source or "without a source"}
 
     def rows(self) -> Iterable[tuple[str, str, str, str, str]]:
-        """For a table: control, neutral, extreme, gain, why it is left alone."""
+        """For a table: control, neutral, extreme, gain, reason why it is not used."""
         for name, (range_, reason) in self.controls.items():
             gain = "" if reason else f"{range_.gain:.2f}"
             yield name, f"{range_.neutral:.3f}", f"{range_.extreme:.3f}", gain, reason
 
 
 class Remap:
-    """Ranges compiled for values in the order of some names.
+    """Ranges compiled for values in the order of given names.
 
     Args:
-        names: of the controls.
-        ranges: by name; names without one keep their values.
+        names: names of the controls.
+        ranges: by name; names without a range keep their values.
 
     Attributes:
         changes: whether any value may change.
@@ -151,11 +151,11 @@ class Remap:
         self._width = self._extreme - self._neutral
 
     def __call__(self, values: Floats) -> Floats:
-        """The values with the ranges taken out.
+        """The values with the ranges removed.
 
         Args:
-            values: float32[..., names]. A value below 0 stays; so does one above 1 that lies
-                beyond the extreme, which overdrive may use.
+            values: float32[..., names]. A value below 0 stays, and so does one above 1 that exceeds
+                the extreme, for overdrive.
 
         Returns:
             float32[..., names], a copy.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Ranges as a text that one can read and edit: NAME.range.toml.
+"""Ranges as an editable text file: NAME.range.toml.
 
 format = "risorius range 1"
 source = "rom.csv"
@@ -21,7 +21,7 @@ from .remap import Learned, Range, Ranges
 
 _FORMAT = "risorius range 1"
 _PREFIX = "CTRL_expressions."
-_LARGEST = 100.0  # no value of a capture is larger
+_LARGEST = 100.0  # no captured value is larger
 _KEYS = {"format", "source", "controls"}
 _HEAD = """\
 # How far the controls of a person's face go in captures. The value "neutral" becomes 0, "extreme"
@@ -31,7 +31,7 @@ _HEAD = """\
 
 
 def ranges_text(ranges: Ranges) -> str:
-    """The text of a file, lines end in LF."""
+    """The text of a file; lines end in LF."""
     lines = [f"{_HEAD}format = {json.dumps(_FORMAT)}", f"source = {_quoted(ranges.source)}"]
     lines += ["", "[controls]"]
     for name, (range_, reason) in ranges.controls.items():
@@ -50,8 +50,8 @@ def load_ranges(path: str | os.PathLike[str]) -> Ranges:
     """A file of ranges.
 
     Raises:
-        AnimationFileError: not there, no TOML, or a field that cannot be used; the sentence names
-            the file, the field and the value.
+        AnimationFileError: missing, not TOML, or an unusable field; the sentence names the file,
+            the field and the value.
     """
     name = os.fspath(path)
     try:
@@ -66,11 +66,11 @@ def load_ranges(path: str | os.PathLike[str]) -> Ranges:
 
 
 def parse_ranges(text: str, where: str) -> Ranges:
-    """The ranges of a text.
+    """The ranges in a text.
 
     Args:
         text: TOML.
-        where: what errors call it.
+        where: its name in errors.
 
     Raises:
         AnimationFileError: as load_ranges.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""DNA files and compiled rigs: load, check, edit, the cache of compiled faces."""
+"""DNA files and compiled rigs: loading, checking, editing, the cache of compiled faces."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Dna -> Dna operations.
+"""Operations from Dna to Dna.
 
-regroup: the joint groups made anew, dense and without outliers.
+regroup rebuilds the joint groups densely and without outliers.
 """
 
 from __future__ import annotations
@@ -29,35 +29,36 @@ def regroup(
     seed: int = 0,
     timed: int = 1000,
 ) -> tuple[Dna, RegroupReport]:
-    """The same face with joint groups that are dense, whatever they were before.
+    """The same face with dense joint groups.
 
-    Joints that the same controls drive come into one region, each region is one dense group with
-    the rows of coarser LODs first, and small coefficients that a control has in a region foreign
-    to it are taken out.
+    Joints that the same controls drive form a region. Each region becomes one dense group in which
+    rows of coarser LODs come first. Small coefficients of controls that are foreign to a region are
+    removed.
 
     Args:
-        dna: stays as it is.
-        regions: joints of each region, by name or index, in a mapping from the regions' names or
-            in a list; a name stands for all joints that have it. Joints that no region lists,
-            and all for None, come together by what drives them.
-        threshold: (mm, degrees, scale): coefficients whose effect at control value 1 is below
-            it are small; x is (x mm, x degrees, x per cent of scale). 0 takes out nothing:
-            the result is the same function, on the scalar path to the last bit.
-        foreign_share: a control is foreign to a region where it moves no more than this share
-            of the region's joints.
-        combinations: random poses that the report compares, beside each raw control at 1.
-        seed: of those poses.
-        timed: evaluations to time on either side, 0 for none.
+        dna: not changed.
+        regions: joints of each region, by name or index, in a mapping by region name or in a list;
+            a name stands for all joints that have it. Joints that no region lists are grouped by
+            the controls that drive them; None: all joints.
+        threshold: (mm, degrees, scale): a coefficient whose effect at control value 1 is below it
+            is small; x is (x mm, x degrees, x per cent of scale). 0 removes nothing, and the result
+            is the same function, on the scalar path to the last bit.
+        foreign_share: a control is foreign to a region if it moves at most this share of the
+            region's joints.
+        combinations: number of random poses that the report compares, in addition to each raw
+            control at 1.
+        seed: seed of the random poses.
+        timed: number of evaluations to time before and after; 0 for none.
 
     Returns:
         The new Dna and a report: sizes before and after, the regions' joint indices, the largest
         change of any joint at any LOD, the median time of an evaluation. Coefficients of joints
-        that are turned by quaternions are never taken out.
+        that quaternions turn are never removed.
 
     Raises:
-        DnaError: a Dna that does not fit together, a joint that is not there or in two
-            regions, a region without joints, a threshold that is no number from 0.
-        ValueError: an unknown joint name; a threshold of other than one or three numbers.
+        DnaError: an inconsistent Dna; a joint that does not exist or is in two regions; a region
+            without joints; a threshold that is not a number from 0.
+        ValueError: an unknown joint name; a threshold that is not one or three numbers.
     """
     mm, degrees, scale = _three(threshold)
     return _regroup(

@@ -3,9 +3,9 @@
 
 A MetaHuman head has twelve: `neck_01`, `neck_02` and `head`, each with `.qx .qy .qz .qw`. Its RBF
 poses, which repair neck and jaw when the head turns, read them. The evaluator neither turns these
-joints nor fills these controls. The host turns the joints and fills the controls before it
-evaluates (EpicGames/MetaHuman-DNA-Calibration, issue 51). Four controls hold the rotation of their
-joint against the neutral pose, about the joint's own axes, in the file's coordinate system.
+joints nor sets these controls: the host turns the joints and sets the controls before evaluation
+(EpicGames/MetaHuman-DNA-Calibration, issue 51). The four controls hold the rotation of their joint
+relative to the neutral pose, about the joint's own axes, in the file's coordinate system.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ ANGLES = {
     "neck": ("neck.yaw", "neck.pitch", "neck.roll"),
     "head": ("head.yaw", "head.pitch", "head.roll"),
 }
-"""Curves of a clip by which neck and head turn, radians, see head_turns."""
-_NOTHING = 1e-7  # of a part of a quaternion that is 0 but for rounding
+"""Curves of a clip that turn neck and head, in radians, see head_turns."""
+_NOTHING = 1e-7  # a part of a quaternion below it is 0 up to rounding
 # In a face's own axes: x to its left, y to its back, z up.
 _FACE_AXES = {
     "right": (1.0, 0.0, 0.0),
@@ -46,8 +46,8 @@ class JointControl:
     Attributes:
         joint: its index; name: its name in the file.
         controls: indices of the raw controls of x, y, z and w.
-        axes: float64[3, 3]; takes the vector part of a rotation about the face's axes (x to the
-            face's left, y to its back, z up) to that of the same rotation about the joint's axes.
+        axes: float64[3, 3]; converts the vector part of a rotation about the face's axes (x to the
+            face's left, y to its back, z up) to the same rotation about the joint's axes.
     """
 
     joint: int
@@ -60,7 +60,7 @@ class JointControl:
 
         Args:
             turns: [..., 4], x, y, z, w of unit quaternions about the face's axes: the rotation of
-                the joint against its neutral pose.
+                the joint relative to its neutral pose.
 
         Returns:
             float64[..., 4], see one_sign.
@@ -70,9 +70,9 @@ class JointControl:
 
 
 def one_sign(turns: Doubles) -> Doubles:
-    """Of q and -q, which are one rotation, the one whose last part other than 0 is positive.
+    """Of q and -q, which are the same rotation, the one whose last nonzero part is positive.
 
-    RBF solvers with Euclidean distances tell q from -q.
+    RBF solvers with Euclidean distances distinguish q from -q.
 
     Args:
         turns: float64[..., 4].
@@ -91,8 +91,8 @@ def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
 
     Returns:
         A JointControl for each joint that has all four controls, in the order of the controls; and
-        a sentence for each rotation that a solver reads and that lacks a control or a joint, or
-        has a control twice.
+        a sentence for each rotation that a solver reads but whose control or joint is missing or
+        repeated.
     """
     read = _read_by_solvers(dna)
     named: dict[str, dict[str, list[int]]] = defaultdict(lambda: defaultdict(list))
@@ -117,7 +117,7 @@ def joint_controls(dna: Dna) -> tuple[list[JointControl], list[str]]:
 
 
 def _what_is_wrong(stem: str, by_part: dict[str, list[int]], where: dict[str, int]) -> str:
-    """A sentence on raw controls that cannot all be filled; empty where they can.
+    """A sentence on raw controls that cannot all be set; empty if they can.
 
     Args:
         stem: their name before the dot.
@@ -172,14 +172,14 @@ def matrix(q: Doubles) -> Doubles:
 
 
 def turned_joints(names: Sequence[str]) -> dict[int, tuple[str, float]]:
-    """The joints that turn as neck and head, by their usual names in any case.
+    """The joints that turn as neck and head, by their usual names in any letter case.
 
     Args:
-        names: of the file's joints.
+        names: names of the file's joints.
 
     Returns:
-        Joint -> "neck" or "head", and the share of the turn that the joint takes: `neck_01` and
-        `neck_02` divide that of the neck.
+        Joint -> "neck" or "head", and its share of the rotation: `neck_01` and `neck_02` divide the
+        neck's rotation.
     """
     where: dict[str, int] = {}
     for index, name in enumerate(names):
@@ -194,7 +194,7 @@ def turned_joints(names: Sequence[str]) -> dict[int, tuple[str, float]]:
 
 
 def shared(turns: Doubles, share: float) -> Doubles:
-    """A share of turns, the short way round.
+    """A share of rotations, the short way round.
 
     Args:
         turns: float64[..., 4], x, y, z, w of unit quaternions; share: 0 to 1.
@@ -207,14 +207,14 @@ def shared(turns: Doubles, share: float) -> Doubles:
 
 
 def bone_turns(bone: str, curves: Mapping[str, npt.NDArray[np.float32]]) -> Doubles | None:
-    """How a clip turns the neck or the head.
+    """The rotation of the neck or the head in a clip.
 
     Args:
         bone: "neck" or "head".
         curves: float32[frames] by name, of the whole clip.
 
     Returns:
-        float64[frames, 4] as of head_turns; None where the clip has no such curve.
+        float64[frames, 4] as in head_turns; None if the clip has no such curve.
     """
     rows = [curves.get(name) for name in ANGLES.get(bone, ())]
     some = next((row for row in rows if row is not None), None)
@@ -229,7 +229,7 @@ def head_turns(angles: npt.NDArray[Any]) -> Doubles:
 
     Args:
         angles: [n, 3] radians: yaw to the face's own left, pitch up, roll towards its own left
-            shoulder; in this order, each about the axes that the one before it turned.
+            shoulder; applied in this order, each about the axes after the one before.
 
     Returns:
         float64[n, 4], x, y, z, w about the face's axes (see JointControl.axes).

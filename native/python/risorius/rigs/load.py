@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From the bytes of a DNA file to a Dna, and to the list of everything that is wrong in it."""
+"""Reads the bytes of a DNA file into a Dna, or into a list of all its faults."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .._native import (
 from ..base import signatures
 from ..base.errors import ArgumentError
 
-# What each name of `layers` brings, as in the format's own data layers.
+# The format's data layers that each name of `layers` loads.
 _LAYERS = {
     "descriptor": set[str](),
     "definition": {"definition"},
@@ -36,7 +36,7 @@ _LAYERS["all"] = {"unknown_layers"}.union(*_LAYERS.values())
 
 
 class Finding(NamedTuple):
-    """One thing that is wrong (an error: the file is refused) or odd (a warning) in a file."""
+    """One fault of a file: an error (the file is refused) or a warning."""
 
     is_error: bool
     code: str
@@ -66,21 +66,21 @@ def load(
         source: a path, or the bytes of a file.
         layers: one name or several of "all", "descriptor", "definition", "behavior",
             "geometry", "geometry_without_blend_shapes", "machine_learned_behavior",
-            "rbf_behavior", "joint_behavior_metadata", "twist_swing_behavior"; each brings what it
-            depends on. What is not asked for is not read.
-        lods: a tuple (max_lod, min_lod), e.g. (0, 2) for the three finest, or a list of LODs; LOD
-            0 is the most detailed. Every index counts in what is left, see Dna.filter_lods.
-        unknown_layers: "preserve" keeps layers that this version does not know as bytes,
-            "ignore" leaves them out and with them, as the format says, the blend shape channels
-            that no loaded layer drives.
-        limits: what the file may ask for at most.
+            "rbf_behavior", "joint_behavior_metadata", "twist_swing_behavior"; each includes the
+            layers that it depends on. Other layers are not read.
+        lods: a tuple (max_lod, min_lod), e.g. (0, 2) for the three finest, or a list of LODs; LOD 0
+            is the most detailed. All indices are renumbered, see Dna.filter_lods.
+        unknown_layers: "preserve" keeps layers that this version does not know as bytes; "ignore"
+            drops them and, as the format demands, the blend shape channels that no loaded layer
+            drives.
+        limits: upper limits for the file.
 
     Returns:
         A Dna. Its arrays are read-only NumPy views: assign a new array to change one.
 
     Raises:
-        DnaError: not a DNA file, cut short, a newer generation, anything that does not fit
-            together; with .code, .offset and .where. Also for a file that cannot be opened.
+        DnaError: not a DNA file, cut short, a newer generation, or inconsistent; with .code,
+            .offset and .where. Also for a file that cannot be opened.
         ValueError: an unknown name in layers or unknown_layers.
     """
     names = [layers] if isinstance(layers, str) else list(layers)
@@ -112,11 +112,11 @@ def load(
 
 
 def check(source: str | os.PathLike[str] | bytes, *, limits: Limits | None = None) -> list[Finding]:
-    """Everything that is wrong or odd in a file, in its order; a bad layer hides no other.
+    """All errors and warnings of a file, in its order; a bad layer does not hide others.
 
     Args:
         source: a path, or the bytes of a file.
-        limits: what the file may ask for at most.
+        limits: upper limits for the file.
 
     Raises:
         DnaError: the file cannot be opened.

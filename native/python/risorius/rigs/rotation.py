@@ -16,8 +16,8 @@ SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 
 
 class Convention:
-    """Order, signs and unit of Euler angles. What a file says and the format does not know is taken
-    as the evaluator takes it: x y z, a turn the usual way, degrees."""
+    """Order, signs and unit of Euler angles. Values of a file that the format does not define are
+    taken like the evaluator does: x y z, positive signs, degrees."""
 
     def __init__(self, sequence: str, signs: tuple[int, ...], unit: str) -> None:
         known = sequence if sequence in SEQUENCES else SEQUENCES[0]
@@ -40,7 +40,7 @@ class Convention:
         return q
 
     def angles(self, q: Doubles) -> Doubles:
-        """float64[4] -> float64[3] in the file's unit; at the pole the last angle is 0."""
+        """float64[4] -> float64[3] in the file's unit; in gimbal lock the last angle is 0."""
         m = _matrix(q)
         i, j, k = self.order
         parity = 1 if j == (i + 1) % 3 else -1
@@ -56,13 +56,13 @@ class Convention:
 
 
 def product(a: Doubles, b: Doubles) -> Doubles:
-    """a * b turns by b first."""
+    """a * b: turns by b first, then by a."""
     v = a[3] * b[:3] + b[3] * a[:3] + np.cross(a[:3], b[:3])
     return np.array([*v, a[3] * b[3] - a[:3] @ b[:3]])
 
 
 def angle_degrees(a: Doubles, b: Doubles) -> float:
-    """How far the rotation b is from the rotation a, 0 to 180 degrees.
+    """The angle between the rotations a and b, 0 to 180 degrees.
 
     Args:
         a, b: float64[4], unit quaternions (x, y, z, w).

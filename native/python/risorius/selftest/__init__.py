@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Does this installation work on this machine? Faces in the wheel against values of a reference."""
+"""Checks an installation: evaluates faces in the wheel and compares them with a reference."""
 
 from .checks import Row, run
 from .report import failed, text

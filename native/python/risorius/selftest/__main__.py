@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""python -m risorius.selftest [FACE.dna]: prints the report; exit code 0 only if all is well."""
+"""python -m risorius.selftest [FACE.dna]: prints the report; exit code 0 only if all checks
+pass."""
 
 import sys
 
@@ -7,7 +8,7 @@ from . import failed, run, text
 
 
 def main() -> int:
-    """Run the checks; a face that is named is the one whose frame is timed."""
+    """Run the checks; if a face is named, its frame is timed."""
     rows = run(sys.argv[1] if len(sys.argv) > 1 else None)
     print(text(rows))
     return 1 if failed(rows) else 0

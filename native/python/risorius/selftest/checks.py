@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The checks, each a row: load, evaluate with every instruction set, write and read, time a frame.
+"""The checks, one row each: load, evaluate with every instruction set, write and read, time a
+frame.
 
-The faces and the values beside them (golden/) are synthetic and come from OpenRigLogic, an
-independent implementation (tests/data/golden/README.md of the project). What is compared was chosen
-by tests/python/support/make_selftest.py.
+The faces and their values (golden/) are synthetic and come from OpenRigLogic, an independent
+implementation (tests/data/golden/README.md of the project). tests/python/support/make_selftest.py
+selects the compared values.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from ..base.errors import RisoriusError
 from ..files import fileio
 
 FACES = ("core", "units", "solvers")
-TOLERANCE = 2e-4  # of max(1, |value|); what float32 sums in another order may differ by
-TIMED = 0.2  # seconds that frames are timed for
-_NAME = "Prüfung 面.dna"  # a name that old ways of writing files do not carry
+TOLERANCE = 2e-4  # times max(1, |value|); float32 sums in another order may differ by this
+TIMED = 0.2  # seconds of timing
+_NAME = "Prüfung 面.dna"  # a name that fails in code with narrow file names
 
 
 class Row(NamedTuple):
-    """What one check found."""
+    """The result of one check."""
 
     name: str
     passed: bool
@@ -43,11 +44,11 @@ class Row(NamedTuple):
 
 
 class _Failed(RisoriusError):  # noqa: N818  never leaves this file
-    """A check found something wrong; the text says what."""
+    """A failed check; the text has the reason."""
 
 
 def run(face: str | os.PathLike[str] | None = None) -> list[Row]:
-    """Run every check; what raises is a row that failed.
+    """Run every check; an exception is a failed row.
 
     Args:
         face: a DNA file whose frame is timed; None takes one of the wheel's.
@@ -68,9 +69,9 @@ def _guarded(name: str, check: Callable[[], str]) -> Row:
         return Row(name, True, check())
     except _Failed as error:
         return Row(name, False, str(error))
-    except OSError as error:  # without the path: a report goes to strangers
+    except OSError as error:  # without the path, because reports are sent to strangers
         return Row(name, False, f"{type(error).__name__}: {error.strerror or 'no reason given'}")
-    except Exception as error:  # noqa: BLE001  the report is for what nobody expected
+    except Exception as error:  # noqa: BLE001  unexpected errors belong in the report
         return Row(name, False, f"{type(error).__name__}: {error}")
 
 
@@ -80,7 +81,7 @@ def content(name: str) -> bytes:
 
 
 class _Case(NamedTuple):
-    """Raw controls at a LOD, and what a reference evaluates them to."""
+    """Raw controls at a LOD, and the reference's results."""
 
     lod: int
     raw: npt.NDArray[np.float32]
@@ -90,7 +91,7 @@ class _Case(NamedTuple):
 
 
 def _cases(name: str) -> Iterator[_Case]:
-    """The cases of a face: golden/NAME.f32, little-endian float32, a row for each.
+    """The cases of a face: golden/NAME.f32, little-endian float32, one row each.
 
     A row is lod, raw controls, joints (9 each), blend shapes, animated maps.
     """
@@ -104,7 +105,7 @@ def _cases(name: str) -> Iterator[_Case]:
 
 
 def _system() -> str:
-    """The system's name and version; of Windows without WMI, which wine has not."""
+    """The system's name and version; on Windows without WMI, which wine lacks."""
     if sys.platform == "win32":
         version = sys.getwindowsversion()
         return f"Windows {version.major}.{version.minor}.{version.build}"
@@ -162,7 +163,7 @@ def _evaluate(simd: str) -> str:
 
 
 def scalar_hash() -> str:
-    """SHA-256 of what the scalar path makes of all cases of the face `core`, in hexadecimal."""
+    """SHA-256 of the scalar path's results for all cases of the face `core`, in hexadecimal."""
     rig = Rig(load(content("core.dna")), simd="scalar")
     out = hashlib.sha256()
     for case in _cases("core"):
@@ -194,10 +195,10 @@ def _files() -> str:
     whole = content("solvers.dna")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / _NAME
-        for _ in range(2):  # the second time over the first
+        for _ in range(2):  # the second time it replaces the first file
             load(whole).save(str(path))
             if path.read_bytes() != whole:
-                raise _Failed("what was written is not what was read")
+                raise _Failed("the file that was read differs from the file that was written")
         if load(path).to_bytes() != whole:
             raise _Failed("the file says something else than its bytes")
         names = load(whole).raw_control_names

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From where a face shall be to its controls: a drag on the skin, or a mesh that moves.
+"""Solves for controls from target positions: a drag on the skin, or a moving mesh.
 
 Raw controls --Surface--> vertices; dragged vertices --solve_drag--> raw controls.
 """

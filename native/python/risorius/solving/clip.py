@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Control curves from a mesh that moves: the solver of a drag on all of a face, frame by frame.
+"""Control curves from a moving mesh: the solver of a drag applied to the whole face, frame by
+frame.
 
-First each frame by itself, from where the frame before it ended: the controls that bring the mesh
-nearest, few of them and within their limits: each has a price, of what noise alone would make of
-it. Then the controls that were worth theirs, without it, all frames together, with a price on how
-suddenly a control changes its speed. What is noise is measured, so that a clean mesh gives its
-curves back and a noisy one gives quiet ones.
+First each frame is solved alone, starting from the frame before it: the controls that bring the
+mesh nearest, few of them and within their limits. Each control has a price, a multiple of the value
+that noise alone would give it. Then the selected controls are solved without that price, for all
+frames together, with a price on sudden changes of speed. The noise is measured: a clean mesh gives
+its curves back, and a noisy one gives quiet curves.
 """
 
 from __future__ import annotations
@@ -27,24 +28,24 @@ from .controls import Bounds, ControlLimits, LimitFields, check_keywords, struct
 from .surface import Doubles, Floats, Surface, numbers
 
 Progress = Callable[[float], object]
-_CHUNK = 24  # frames that are solved in a row
-_AROUND = 8  # frames before and behind a chunk that its curves are smoothed with
-_FLOOR_MM = 0.004  # of what is taken for noise
-_WORTH = 3.0  # standard errors of a control's value that its price is
-_LEAST = 0.01  # a control that never goes further is not used
-_SUDDEN = (0.004, 0.5)  # least and most usual change of a step from frame to frame, at 30 a second
-_SOON = 0.1  # a control's change from which on derivatives are made anew
-_ENOUGH = 5e-4  # a control's change that is none
+_CHUNK = 24  # frames that are solved in sequence
+_AROUND = 8  # frames before and after a chunk that take part in its smoothing
+_FLOOR_MM = 0.004  # smallest noise that is assumed
+_WORTH = 3.0  # price of a control, in standard errors of its value
+_LEAST = 0.01  # a control with a smaller range is not used
+_SUDDEN = (0.004, 0.5)  # smallest and largest usual second difference, at 30 frames per second
+_SOON = 0.1  # change of a control after which derivatives are recomputed
+_ENOUGH = 5e-4  # a smaller change of all controls ends the iteration
 
 
 class CancelledError(RisoriusError):
-    """progress said False."""
+    """progress returned False."""
 
     code = "cancelled"
 
 
 class SolvedClip(NamedTuple):
-    """A moving mesh as curves, and what they leave."""
+    """A moving mesh as curves, and the remaining error."""
 
     clip: Clip
     frame_residual: Floats
@@ -54,15 +55,15 @@ class SolvedClip(NamedTuple):
     largest: float
     """Of all vertices in all frames, in the file's unit."""
     noise: float
-    """What of the mesh was taken for noise: a standard deviation in the file's unit."""
+    """Assumed noise of the mesh: a standard deviation in the file's unit."""
 
 
 @dataclass
 class _Job:
-    """What stays the same in all frames."""
+    """The constants of all frames."""
 
     surface: Surface
-    points: npt.NDArray[np.int64]  # [P, 2]: that are looked at
+    points: npt.NDArray[np.int64]  # [P, 2]: the compared vertices
     targets: Floats  # [F, P, 3]
     low: Doubles  # [R]
     high: Doubles
@@ -71,9 +72,9 @@ class _Job:
     sparse: float
     smooth: float
     rate: float
-    sigma: float  # what a vertex may be off, in the file's unit
+    sigma: float  # expected error of a vertex, in the file's unit
     told: Progress | None
-    share: float  # of the whole for each frame and pass
+    share: float  # of the whole, for each frame and pass
     done: float = 0.0
     stop: list[bool] = field(default_factory=list)
 
@@ -85,7 +86,7 @@ class _Job:
 
 
 class _Frame:
-    """One frame being solved: derivatives at a pose near by, and what is missing."""
+    """One frame: derivatives at a nearby pose, and the residual."""
 
     def __init__(self, job: _Job) -> None:
         self._job = job
@@ -94,7 +95,7 @@ class _Frame:
         self.matrix = np.zeros((0, 0))
 
     def linearise(self, raw: Doubles, within: float) -> bool:
-        """Derivatives at a pose, unless they were made at one so near. Returns: made anew."""
+        """Compute derivatives at a pose unless those of a near pose exist. Returns: computed."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
@@ -103,18 +104,18 @@ class _Frame:
         return True
 
     def is_at(self, raw: Doubles) -> bool:
-        """Whether the derivatives are those of the pose."""
+        """Whether the derivatives belong to the pose."""
         return self._at is not None and bool((raw == self._at).all())
 
     def forget(self) -> None:
-        """The next derivatives are made anew."""
+        """Force new derivatives."""
         self._at = None
 
     def missing(self, raw: Doubles, frame: int) -> Doubles:
         return np.asarray(self._job.targets[frame] - self._probe.positions(raw))
 
     def pull(self, missing: Doubles) -> Doubles:
-        """What each control could do for it: J^T missing."""
+        """The gradient of each control: J^T missing."""
         return self._probe.gradient(missing)
 
 
@@ -133,31 +134,32 @@ def solve_clip(
     progress: Progress | None = None,
     **keywords: Unpack[LimitFields],
 ) -> SolvedClip:
-    """The curves of the controls that repeat a moving mesh.
+    """The control curves that reproduce a moving mesh.
 
     Args:
         surface: the face.
-        frames: float32[F, V, 3] of a mesh of the face, by its index in dna.meshes; an array alone
-            is the first mesh of the LOD. The file's unit and axes, the head held still.
+        frames: float32[F, V, 3] of meshes by index in dna.meshes; a single array is the first mesh
+            of the LOD. In the file's unit and axes, without motion of the head.
         rate: frames per second.
         start: seconds, the time of the first frame.
-        neutral: float[V, 3] of what moves, at rest, by mesh as frames: then its movement is taken
-            and not its shape, as for another face of the same topology. None: the face's own.
-        sparse: how much a control's amount costs; 0 nothing, 1 as is usual.
-        smooth: how much a sudden change costs; 0 nothing, 1 as is usual.
-        limits: which controls may move, and between which values; None is all but the parts of
-            rotations, from 0 to 1.
-        most_points: how many vertices are looked at; the residual is of all.
-        threads: that work at once; 0 is all cores. The result does not depend on it.
-        progress: told the share that is done, 0 to 1; False stops.
-        keywords: fields of `limits`, where it is not given.
+        neutral: float[V, 3] of the moving mesh at rest, by mesh as frames: then its displacements
+            are used instead of its shape, as for another face of the same topology. None: the
+            face's own neutral.
+        sparse: price of a control's amount; 0: none, 1: the default.
+        smooth: price of a sudden change; 0: none, 1: the default.
+        limits: the controls that may move, and their ranges; None: all except parts of rotations,
+            from 0 to 1.
+        most_points: number of vertices to compare; the residual covers all vertices.
+        threads: number of threads; 0: all cores. The result does not depend on it.
+        progress: called with the share of the work, 0 to 1; returning False stops.
+        keywords: fields of `limits`, if it is None.
 
     Returns:
-        The clip has a curve for each control that moves at all.
+        The clip has a curve for each control that moves.
 
     Raises:
-        ValueError: an argument that makes no sense; the sentence names it.
-        CancelledError: progress said False.
+        ValueError: an invalid argument; the sentence names it.
+        CancelledError: progress returned False.
     """
     check_keywords("solve_clip", keywords, ControlLimits)
     limits = structure("limits", limits, ControlLimits, keywords)
@@ -188,22 +190,22 @@ def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> N
 
 
 def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
-    """float32[F, P, 3]: where points int64[P, 2] are wanted."""
+    """float32[F, P, 3]: target positions of points int64[P, 2]."""
     return np.concatenate(
         [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )
 
 
 def _curves(job: _Job, count: int, workers: int) -> Doubles:
-    """float64[F, R]: of each frame by itself, then of all together."""
+    """float64[F, R]: solved frame by frame, then together."""
     begins = _begins(job, count)
     left = np.mean([_left(job, raw, f) for f, raw in begins.items()])
-    job.sigma = max(job.sigma, float(np.sqrt(left)))  # another face is never wholly repeated
+    job.sigma = max(job.sigma, float(np.sqrt(left)))  # another face is never reproduced exactly
     return _together(job, _alone(job, count, begins, workers), workers)
 
 
 def _begins(job: _Job, count: int) -> dict[int, Doubles]:
-    """float64[R] of the first frame of each chunk, one after the other."""
+    """float64[R] of the first frame of each chunk, in sequence."""
     frame, at, out = _Frame(job), job.rest, {}
     for begin in range(0, count, _CHUNK):
         at = out[begin] = _nearest(job, frame, begin, at, 12)
@@ -212,7 +214,7 @@ def _begins(job: _Job, count: int) -> dict[int, Doubles]:
 
 
 def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> Doubles:
-    """float64[F, R]: each frame by itself."""
+    """float64[F, R]: each frame solved alone."""
     curves = np.tile(job.rest, (count, 1))
 
     def chunk(begin: int) -> None:
@@ -227,12 +229,12 @@ def _alone(job: _Job, count: int, begins: dict[int, Doubles], workers: int) -> D
 
 
 def _prices(job: _Job, matrix: Doubles) -> Doubles:
-    """float64[R]: what noise alone makes of a control's pull, some times over."""
+    """float64[R]: the prices, a multiple of the gradient that noise alone gives each control."""
     return job.sparse * _WORTH * np.sqrt(np.maximum(np.diag(matrix), 0)) / job.sigma
 
 
 def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) -> Doubles:
-    """float64[R]: the controls of a frame by itself."""
+    """float64[R]: the controls of one frame solved alone."""
     at, missing = start, frame.missing(start, index)
     scale = job.sigma**-2
     for _ in range(rounds):
@@ -261,10 +263,10 @@ def _nearest(job: _Job, frame: _Frame, index: int, start: Doubles, rounds: int) 
 
 
 def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
-    """float64[F, R]: all frames with a price on sudden changes, chunk by chunk with what is around.
+    """float64[F, R]: all frames with a price on sudden changes, by chunks with their surroundings.
 
-    A chunk starts from the frames by themselves, so that chunks can be solved at the same time.
-    Only what moved there moves here, without its price.
+    A chunk starts from the frames solved alone, so that chunks can be solved in parallel. Only
+    controls that moved there move here, without their price.
     """
     count = len(curves)
     used = np.flatnonzero(np.abs(curves - job.rest).max(axis=0) > (_LEAST if job.sparse else 0))
@@ -297,11 +299,11 @@ def _together(job: _Job, curves: Doubles, workers: int) -> Doubles:
 
 
 def _stiffness(job: _Job, curves: Doubles, used: npt.NDArray[np.intp]) -> Doubles:
-    """float64[F - 2, used]: the price of a sudden change of each control, around each frame.
+    """float64[F - 2, used]: price of a sudden change of each control, around each frame.
 
-    One over the square of how suddenly it usually changes: what its curve does, less what noise
-    makes of it; where it plainly does more, as much as it does. So a blink stays sharp while a slow
-    jaw is held quiet.
+    It is 1 over the squared usual second difference: that of the control's curve minus the part
+    caused by noise, or the local one where it is clearly larger. A blink therefore stays sharp
+    while a slow jaw is kept quiet.
     """
     if len(curves) < 3:
         return np.zeros((0, len(used)))
@@ -328,7 +330,7 @@ def _smoothed(
     matrices: list[Doubles],
     aims: list[Doubles],
 ) -> Doubles:
-    """float64[n, used]: forwards and backwards through the frames until none changes any more."""
+    """float64[n, used]: sweeps forwards and backwards through the frames until nothing changes."""
     count = len(curves)
     bend = np.diff(np.eye(count), 2, axis=0) if count > 2 else np.zeros((0, count))
     bends = np.einsum("ti,tc,tj->ijc", bend, stiff, bend)  # [n, n, used]
@@ -374,15 +376,15 @@ def _result(
 
 
 def _left(job: _Job, raw: Doubles, frame: int) -> float:
-    """The mean square of what is missing of a coordinate."""
+    """The mean squared residual of a coordinate."""
     probe = job.surface.probe(job.points)
     return float(((job.targets[frame] - probe.positions(raw)) ** 2).mean())
 
 
 def _noise(targets: Floats) -> float:
-    """The standard deviation of what changes at random from frame to frame.
+    """The standard deviation of random changes from frame to frame.
 
-    Fourth differences leave little of a movement and sqrt(70) times the noise.
+    Fourth differences remove most of a movement and multiply the noise by sqrt(70).
     """
     if len(targets) < 5:
         return 0.0
@@ -393,7 +395,7 @@ def _noise(targets: Floats) -> float:
 def _points(
     surface: Surface, wanted: dict[int, Floats], bounds: Bounds, most: int
 ) -> npt.NDArray[np.int64]:
-    """int64[P, 2]: the vertices that a control moves at rest, evenly taken."""
+    """int64[P, 2]: an even selection of the vertices that some control moves at rest."""
     if most < 1:
         raise ArgumentError(f"most_points: 1 or more was expected, found {most}")
     rest = surface.rig.initial_raw_controls
@@ -424,7 +426,8 @@ def _meshes(
             end = len(surface.vertex_counts)
             raise ArgumentError(f"{name}: meshes below {end} were expected, found {shown(mesh)}")
         is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
-        with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused below
+        # Values beyond float32 become infinite and are refused below.
+        with np.errstate(over="ignore"):
             array = np.asarray(value if is_real else numbers(name, value), np.float32)
         count = surface.vertex_counts[mesh]
         if array.ndim != axes or array.shape[-2:] != (count, 3):
@@ -452,7 +455,7 @@ def _moved(
     wanted: dict[int, Floats],
     neutral: npt.ArrayLike | Mapping[int, npt.ArrayLike] | None,
 ) -> dict[int, Floats]:
-    """Where the face's own vertices are wanted, float32[F, V, 3] by mesh."""
+    """Target positions of the face's own vertices, float32[F, V, 3] by mesh."""
     if neutral is None:
         return wanted
     own = _meshes("neutral", surface, neutral, 2)
@@ -463,7 +466,7 @@ def _moved(
 
 
 def _usual(surface: Surface) -> npt.NDArray[np.bool_]:
-    """bool[R]: all controls but the parts of rotations."""
+    """bool[R]: all controls except parts of rotations."""
     parts = {f"{stem}{part}" for stem in (".", ".q") for part in "xyzw"}
     names = surface.rig.raw_control_names
     return np.array([not any(name.endswith(part) for part in parts) for name in names], bool)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arguments that say how a solver treats the controls: their limits, how they share a drag."""
+"""Arguments for the controls of a solver: their limits, and the way in which they share a drag."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from .surface import Doubles, limits, vector
 
 
 class Bounds(NamedTuple):
-    """Limits, checked: between which values each control of a face may go."""
+    """Checked limits: the range of each control of a face."""
 
     low: Doubles
     """float64[R]"""
     high: Doubles
     """float64[R]"""
     free: npt.NDArray[np.bool_]
-    """bool[R]: the others have the value of the pose as their low and high."""
+    """bool[R]; for all other controls low and high equal the pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class ControlLimits:
-    """Which controls a solver may change, and between which values.
+    """The controls that a solver may change, and their ranges.
 
-    A control that begins beyond its limits may stay where it is.
+    A control that starts outside of its range may keep its value.
     """
 
     free: npt.ArrayLike | None = None
-    """bool[R], which controls may change; None is all, of a clip all but the parts of rotations."""
+    """bool[R], controls that may change; None: all, for a clip all except parts of rotations."""
     lowest: npt.ArrayLike | None = None
     """float[R] or one number; None is 0."""
     highest: npt.ArrayLike | None = None
     """float[R] or one number; None is 1."""
 
     def around(self, pose: Doubles, usual: npt.ArrayLike = True) -> Bounds:
-        """The limits of a face's controls, with the pose inside.
+        """The limits of a face's controls, widened to contain the pose.
 
         Args:
-            pose: float64[R], where the controls begin.
-            usual: bool or bool[R], which controls may change where `free` is None.
+            pose: float64[R], the initial values.
+            usual: bool or bool[R], used if `free` is None.
 
         Raises:
-            ArgumentError: another shape, no number, a lowest above its highest.
+            ArgumentError: a wrong shape, not a number, a lowest above its highest.
         """
         low, high = limits(len(pose), self.lowest, self.highest)
         low, high = np.minimum(low, pose), np.maximum(high, pose)
@@ -58,18 +58,18 @@ class ControlLimits:
 
 @dataclass(frozen=True, eq=False)
 class ControlSharing:
-    """How controls share a drag: how readily each changes, and which go together or never do."""
+    """How controls share a drag: their ease, partners and opposites."""
 
     ease: npt.ArrayLike | None = None
-    """float[R] above 0, how readily each control changes: one of 0.1 costs ten times as much; of
-    two partners the readier one counts; None is 1."""
+    """float[R] above 0, how readily each control changes: 0.1 costs ten times as much as 1. Of two
+    partners the larger ease counts. None: 1."""
     partners: npt.ArrayLike | None = None
-    """int[R], each control's partner, itself where it has none: the two change alike, as left and
-    right of a symmetric drag; None is no partners."""
+    """int[R], each control's partner, or itself: partners change by the same amount, like left and
+    right of a symmetric drag. None: no partners."""
     opposites: Sequence[tuple[int, int]] = ()
-    """Pairs of controls of which one at most shall be on, as mouthLeft and mouthRight. A face whose
-    halves differ finds a use for both at once, and nobody wants that. Two that are partners as well
-    stay as they are."""
+    """Pairs of controls of which at most one may be on, such as mouthLeft and mouthRight. On an
+    asymmetric face both together would fit best, but look wrong. Opposites that are partners too
+    are not affected."""
 
 
 class LimitFields(TypedDict, total=False):
@@ -94,16 +94,16 @@ _Structure = TypeVar("_Structure", ControlLimits, ControlSharing)
 def structure(
     name: str, given: _Structure | None, kind: type[_Structure], keywords: Mapping[str, object]
 ) -> _Structure:
-    """A structure as a caller gave it, or made of the keywords that are its fields.
+    """The structure that a caller gave, or one made from its fields among the keywords.
 
     Args:
-        name: of the argument.
-        given: the structure; None where it was not given.
+        name: name of the argument.
+        given: the structure; None if it was not given.
         kind: its class.
-        keywords: of the call, perhaps with others.
+        keywords: keywords of the call; may have others.
 
     Raises:
-        ArgumentError: the structure and some of its fields were given.
+        ArgumentError: both the structure and some of its fields were given.
     """
     make: Callable[..., _Structure] = kind
     own = {field.name for field in fields(kind)} & keywords.keys()
@@ -120,15 +120,15 @@ def check_keywords(
     keywords: Mapping[str, object],
     *kinds: type[ControlLimits] | type[ControlSharing],
 ) -> None:
-    """Refuse keywords as Python does.
+    """Refuse unknown keywords like Python does.
 
     Args:
         function: its name.
-        keywords: of the call.
-        kinds: the structures whose fields are its keywords.
+        keywords: keywords of the call.
+        kinds: structures whose fields are valid keywords.
 
     Raises:
-        TypeError: a keyword that the function does not have.
+        TypeError: an unknown keyword.
     """
     known = {field.name for kind in kinds for field in fields(kind)}
     for keyword in keywords:

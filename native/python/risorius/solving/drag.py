@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The controls that bring points of the skin where they are wanted.
+"""Finds the controls that move points of the skin to target positions.
 
 J. P. Lewis and Ken Anjyo, "Direct Manipulation Blendshapes", IEEE Computer Graphics and
 Applications 30 (4), 2010: the smallest change of the sliders, by least squares. Ozan Cetinaslan,
 "Position Manipulation Techniques for Facial Animation", PhD thesis, Porto 2016, and later papers:
-the transpose of the Jacobian in the place of its inverse.
+the transpose of the Jacobian in place of its inverse.
 """
 
 from __future__ import annotations
@@ -33,22 +33,22 @@ from .surface import Doubles, Floats, Surface, numbers, vector, wholes
 
 METHODS = ("least_squares", "transpose", "sparse")
 LOCAL = 0.12
-"""A control that does less here, of what it does where it does most, than this share of what the
-most local one does, belongs elsewhere: gaze to the eyes, though lids and brows follow it."""
+"""The effect of a control here is compared with its largest effect anywhere. If this ratio is below
+LOCAL times that of the most local control, the control belongs elsewhere: gaze belongs to the eyes,
+although lids and brows follow it."""
 ELSEWHERE = 0.001
-"""The ease of a control that belongs elsewhere."""
+"""The ease of controls that belong elsewhere."""
 
 
 class Solved(NamedTuple):
-    """What a drag made of the controls."""
+    """The result of a drag."""
 
     raw: Floats
     """float32[R]"""
     positions: Floats
-    """float32[P, 3]: where the points are with it, in the file's units."""
+    """float32[P, 3]: the resulting positions of the points, in the file's units."""
     error: float
-    """Root of the mean square of how far the points are from their targets along their axes, each
-    by its weight; file units."""
+    """Weighted root mean square of the remaining distances along the axes, in file units."""
     change: float
     """The length of the change of the controls."""
 
@@ -68,31 +68,31 @@ def solve_drag(
     rounds: int = 4,
     **keywords: Unpack[DragFields],
 ) -> Solved:
-    """The smallest change of the controls that brings points where they are wanted.
+    """The smallest change of the controls that moves points to targets.
 
     Args:
         surface: the face.
-        raw: float[R], the pose that the drag began with.
+        raw: float[R], the pose at the begin of the drag.
         points: (mesh, vertex) of each dragged or pinned point.
-        targets: float[P, 3] in the file's units; of a pin where it is.
-        axes: float[P, k, 3]: unit vectors along which each point counts, e.g. two of a screen,
-            which leave the depth free; None is all three.
-        weights: float[P], how much each point counts; None is 1.
-        limits: which controls may change, and between which values; None is all, from 0 to 1.
-        sharing: how readily each control changes, and which go together; None is all alike.
-        method: "least_squares"; "transpose", which takes the controls that move the points
-            themselves by as much as they do so: surprises less far from the drag; or "sparse", few
-            controls, about one for each direction that counts, which may leave some of the
-            way missing, 0.6 mm at most, and ask those that belong elsewhere (an ease below a tenth)
-            only where they bring the points noticeably nearer. Of targets that few do not reach it
-            takes more, until it is less than 1.3 mm behind least squares without ease.
-        smallest: how much a small change is worth, beside the reach of the strongest control; more
+        targets: float[P, 3] in the file's units; a pin has its present position.
+        axes: float[P, k, 3]: unit vectors along which each point counts, e.g. the two of a screen,
+            which leave the depth free; None: all three.
+        weights: float[P], the importance of each point; None: 1.
+        limits: the controls that may change, and their ranges; None: all, from 0 to 1.
+        sharing: ease, partners and opposites of the controls; None: all are equal.
+        method: "least_squares"; "transpose", which uses controls in proportion to their effect on
+            the points and changes less elsewhere; or "sparse", which uses few controls, about one
+            for each direction that counts. "sparse" may miss the target by up to 0.6 mm, and uses
+            controls that belong elsewhere (an ease below a tenth) only if they bring the points
+            clearly nearer. If few controls do not reach the targets it adds more, until it is less
+            than 1.3 mm behind least squares without ease.
+        smallest: price of a change relative to the reach of the strongest control; a larger value
             gives up some of the target.
-        rounds: how often at most the face is looked at anew on the way.
-        keywords: fields of `limits` and `sharing`, where these are not given.
+        rounds: largest number of linearisations.
+        keywords: fields of `limits` and `sharing`, if these are None.
 
     Raises:
-        ValueError: an argument that makes no sense; the sentence names it.
+        ValueError: an invalid argument; the sentence names it.
     """
     check_keywords("solve_drag", keywords, ControlLimits, ControlSharing)
     limits = structure("limits", limits, ControlLimits, keywords)
@@ -119,7 +119,7 @@ def _solved(
     smallest: float,
     rounds: int,
 ) -> Doubles:
-    """float64[R]: the pose that a method finds, of two opposites one at most."""
+    """float64[R]: the pose that a method finds, with at most one of two opposites."""
 
     def exactly(drag: Drag, start: Doubles) -> Doubles:
         return least_squares(drag, begin, start, smallest, rounds)
@@ -154,9 +154,9 @@ def _kept_apart(
     opposites: npt.NDArray[np.int64],
     solve: Callable[[Drag, Doubles], Doubles],
 ) -> Doubles:
-    """What `solve` finds with one of two opposites alone: the one that it uses more.
+    """The result of `solve` with only one of two opposites: the one that it uses more.
 
-    One that was on goes back before the other comes.
+    An opposite that was on goes back to rest before the other one starts.
     """
     partner = np.arange(len(begin))
     partner[drag.unknowns.first] = drag.unknowns.second
@@ -179,9 +179,9 @@ def _kept_apart(
 def _both_on(
     opposites: npt.NDArray[np.int64], at: Doubles, begin: Doubles
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Of the pairs that are both on, further than they were: the lesser ones, and the others.
+    """Of the pairs that are both on, further than before: the weaker and the stronger ones.
 
-    The lesser one is that which was less on before, or, of two at rest, is so now.
+    The weaker one was on less before, or, if both rested, is on less now.
     """
     before = np.maximum(begin[opposites].min(axis=1), 0.0)
     pairs = opposites[at[opposites].min(axis=1) > before + ON]
@@ -191,7 +191,7 @@ def _both_on(
 
 
 def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
-    """Down the slope, each time as far as is best by the derivatives; in the limits."""
+    """Gradient descent within the limits; each step is the best by the derivatives."""
     for _ in range(max(1, 3 * rounds)):
         jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
         toward = drag.unknowns.columns(jacobian).T @ missing
@@ -206,22 +206,23 @@ def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
 
 
 def local_ease(surface: Surface, reach: npt.ArrayLike) -> Doubles:
-    """How readily controls shall change where points are dragged, for solve_drag: float64[R].
+    """The ease of each control at dragged points, for solve_drag: float64[R].
 
-    ELSEWHERE for those that do less than LOCAL there, of what they do where they do most, than the
-    one that does most of its own there: a brow that is dragged then turns no eye, though eyes that
-    turn move it. The others cost what they move all over the face beside what they do there: a
-    brow lowers before a face is screwed up, which lowers it as much. The readiest of them has 1.
+    A control gets ELSEWHERE if its effect here, relative to its largest effect anywhere, is below
+    LOCAL times that of the most local control: a dragged brow then does not turn the eyes, although
+    turning eyes move the brow. The others cost in proportion to their effect on the whole face
+    relative to the effect here: the brow lowers before the whole face is screwed up, which would
+    lower it as well. The readiest control has ease 1.
 
     Args:
         surface: the face.
-        reach: float[P, 3, R], what each control does to the points: of surface.jacobian.
+        reach: float[P, 3, R], effect of each control on the points, from surface.jacobian.
     """
     here = np.linalg.norm(numbers("reach", reach), axis=1).max(axis=0, initial=0.0)
     share = here / np.maximum(np.maximum(surface.strongest(), here), 1e-30)
     local = share >= LOCAL * share.max(initial=0.0)
     alone = here / np.maximum(surface.spread(), 1e-30)
-    # solve_drag squares what a change costs, so the root of that quotient makes it one of lengths.
+    # solve_drag squares the cost of a change, so the root makes it proportional to lengths.
     readiness = np.sqrt(alone / np.maximum(alone[local].max(initial=0.0), 1e-30))
     return np.where(local, np.maximum(readiness, ELSEWHERE), ELSEWHERE)
 
@@ -237,24 +238,24 @@ def best_controls(
     count: int = 8,
     **keywords: Unpack[LimitFields],
 ) -> list[tuple[int, float, float]]:
-    """The controls that alone bring a point nearest to a target, best first.
+    """The controls that bring a point nearest to a target when used alone, best first.
 
     Args:
         surface: the face.
-        raw: float[R], the pose that the drag began with.
+        raw: float[R], the pose at the begin of the drag.
         point: (mesh, vertex).
         target: float[3] in the file's units.
-        axes: float[k, 3]: unit vectors along which the point counts; None is all three.
-        limits: which controls may change, and between which values; None is all, from 0 to 1.
-        count: how many at most.
-        keywords: fields of `limits`, where it is not given.
+        axes: float[k, 3]: unit vectors along which the point counts; None: all three.
+        limits: the controls that may change, and their ranges; None: all, from 0 to 1.
+        count: largest number of results.
+        keywords: fields of `limits`, if it is None.
 
     Returns:
-        (control, the value that it would take, how far the point then is from its target along the
-        axes in the file's units); none that makes it no better.
+        (control, its value, the remaining distance of the point along the axes in the file's
+        units); controls that bring no improvement are left out.
 
     Raises:
-        ValueError: an argument that makes no sense; the sentence names it.
+        ValueError: an invalid argument; the sentence names it.
     """
     check_keywords("best_controls", keywords, ControlLimits)
     limits = structure("limits", limits, ControlLimits, keywords)
@@ -274,7 +275,8 @@ def best_controls(
 
 
 def _alone(drag: Drag, begin: Doubles, control: int) -> tuple[int, float, float]:
-    """The best value of one control, and what is then missing: by secants, as the face bends."""
+    """The best value of one control and the remaining distance, by secants because the face
+    bends."""
     low, high = float(drag.low[control]), float(drag.high[control])
     places = np.linspace(low, high, 5)
     at = begin.copy()

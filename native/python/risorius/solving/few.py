@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The few controls that do a drag, and more of them where few end behind what all would do."""
+"""Selects few controls for a drag, and adds more if these end too far behind all controls."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from .pull import ON, Drag, least_squares, seen_from
 from .sparse import cheapest_change, cheapest_to
 from .surface import Doubles
 
-_HARD = 0.1  # of the largest ease: controls of less belong elsewhere
-# Of a sparse drag: what of the way, and how many mm, may be missing for the sake of fewer controls,
-# and how much nearer those that belong elsewhere have to bring the points together.
+_HARD = 0.1  # of the largest ease: controls with less belong elsewhere
+# A sparse drag may miss this share of the way, or this many mm, to use fewer controls; and controls
+# that belong elsewhere must bring the points nearer by at least these amounts together.
 _MISSING, _MISSING_MM = 0.02, 0.6
 _HELP, _HELP_MM = 0.02, 1.3
-_DEAR = 100.0  # what those elsewhere cost: they come after all others
-# What a control has to do, of what the strongest could, to take part, and one of those elsewhere.
+_DEAR = 100.0  # price of controls that belong elsewhere: they come after all others
+# Least effect of a control relative to the strongest one, here and elsewhere.
 _WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
-# Where few controls end farther from the targets than all of them would by this, more come. Below
-# it nobody looks for what all of them would do.
+# More controls are added if few end farther from the targets than all would by this distance. Below
+# it the solution of all controls is not computed.
 BEHIND_MM = 1.3
-_MORE = 3  # how often more controls come by derivatives, before those of all are taken
-_NOTHING_MM = 0.02  # a look at more controls that brings the points less near is the last
-_WEAKEST = 0.01  # of the strongest's reach: what does less is not among them
-_STILL = 1e-4  # of a control: a look that changes less is the last
-_GONE = 0.01  # the price of a control that moved already
-_HALVES = 5  # looks for the nearest pose on a way
-_FEW = 2  # controls: where more were found, it is tried whether fewer do
-_FREED = 4.0  # a control that was found has so much more room when all of them are fitted
+_MORE = 3  # attempts to add controls by derivatives before all are taken
+_NOTHING_MM = 0.02  # an attempt that brings the points less near is the last one
+_WEAKEST = 0.01  # of the strongest's reach: weaker controls are not selected
+_STILL = 1e-4  # an iteration that changes controls less is the last one
+_GONE = 0.01  # price of a control that moved already
+_HALVES = 5  # bisections on the way to another pose
+_FEW = 2  # controls: if more were selected, fewer are tried
+_FREED = 4.0  # room of a selected control during the fit, relative to its change
 
 
 def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The cheapest change that comes near enough, then of the controls that it moves the best.
+    """The cheapest change that comes near enough, then the best pose of the selected controls.
 
-    A control costs the root of how far it brings the points, by its ease: of several that go one
-    way a strong one is preferred to weak ones that go to their limits. The controls are found as
-    the face is at the begin, once: so they depend continuously on the targets, but for those that
-    prove to be superfluous on the face itself, which bends.
+    A control costs the root of its effect on the points, by its ease: of several controls in one
+    direction a strong one is preferred to weak ones at their limits. Controls are selected once, by
+    the derivatives at the begin, so that the selection depends continuously on the targets, except
+    for controls that prove superfluous on the bent face.
 
     Args:
         drag: the drag.
-        begin: float64[R], the pose at its begin.
-        smallest, rounds: as of solve_drag.
+        begin: float64[R], the pose at the begin.
+        smallest, rounds: as in solve_drag.
     """
     price, elsewhere = prices(drag)
     units = drag.unknowns.alike()
@@ -76,10 +76,10 @@ def few_controls(drag: Drag, begin: Doubles, smallest: float, rounds: int) -> Do
 
 
 def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int) -> Doubles:
-    """The best pose of the controls that a change by derivatives moves, float64[U], about there.
+    """The best pose near a change float64[U], using only the controls that it moves.
 
-    By whole steps of Gauss-Newton, whose end is continuous in the targets; where they end far from
-    these, by halved ones, if that is nearer.
+    Full Gauss-Newton steps, whose result is continuous in the targets; if it ends far from them,
+    halved steps are used if they end nearer.
     """
     units, change = drag.unknowns, drag.unknowns.change(x, len(begin))
     drag = drag.held([*map(int, np.flatnonzero(change == 0))], begin)
@@ -106,7 +106,7 @@ def _fitted(drag: Drag, begin: Doubles, x: Doubles, smallest: float, rounds: int
 
 
 def prices(drag: Drag) -> tuple[Doubles, npt.NDArray[np.bool_]]:
-    """What each unknown costs by its ease, and which belong elsewhere: float64[U], bool[U].
+    """The price of each unknown by its ease, and whether it belongs elsewhere: float64[U], bool[U].
 
     Args:
         drag: the drag.
@@ -124,15 +124,15 @@ def nearer(
     every: Doubles,
     pairs: npt.NDArray[np.int64],
 ) -> Doubles:
-    """More controls, until the points are as near as all of them bring them, but for BEHIND_MM.
+    """Adds controls until the points are as near as with all controls, up to BEHIND_MM.
 
     Args:
-        drag: whose unknowns are alike.
-        price: float64[U], of an unknown.
+        drag: with unknowns of equal ease.
+        price: float64[U].
         begin: the pose at the begin.
-        few: the pose of few controls.
-        every: the pose of all of them.
-        pairs: of opposites.
+        few: the pose with few controls.
+        every: the pose with all controls.
+        pairs: pairs of opposites.
     """
     aim = drag.far(every) + BEHIND_MM
     if drag.far(few) <= aim:
@@ -151,7 +151,7 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """The drag and a pose without the opposites of what is on in another pose."""
+    """The drag and a pose without the opposites of controls that are on in `every`."""
     on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
     off = [
         int(pair[1 - side])
@@ -165,9 +165,9 @@ def _agreeing(
 
 
 def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: float) -> Doubles:
-    """A pose with as many more controls as bring the points as near as asked for by derivatives.
+    """A pose with as many additional controls as the derivatives need to come near enough.
 
-    Those that moved already cost next to nothing.
+    Controls that moved already are nearly free.
     """
     units, count = drag.unknowns, len(begin)
     jacobian, missing = units.columns(drag.jacobian(at)), drag.residual(drag.positions(at))
@@ -188,7 +188,7 @@ def _with_more(drag: Drag, price: Doubles, begin: Doubles, at: Doubles, aim: flo
 
 
 def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Doubles:
-    """A pose without as many of its weakest controls as half of what may be missing allows."""
+    """A pose without as many of its weakest controls as half of the tolerance allows."""
     units = drag.unknowns
     change = units.values(every - begin)
     order = np.argsort(np.abs(change) * np.linalg.norm(units.columns(drag.jacobian(every)), axis=0))
@@ -207,7 +207,7 @@ def _without_weak(drag: Drag, begin: Doubles, every: Doubles, aim: float) -> Dou
 
 
 def _towards(drag: Drag, at: Doubles, other: Doubles, aim: float) -> Doubles:
-    """The first of some poses on the way to another one that is as near as asked for."""
+    """The first of some poses on the way to another pose that is near enough."""
     if drag.far(at) <= aim:
         return at
     none, whole = 0.0, 1.0

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where a face wants to be dragged: few vertices, where the controls reach most.
+"""Places handles for dragging: few vertices that reach as many controls as possible.
 
-The idea of optimal handles: Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable
-Face-Rig Manipulation", ACM Transactions on Graphics 40 (4), 2021. They choose by integer
-programming; here one after the other, each for what those before it cannot do.
+From optimal handles: Jin Huat Kim and Karan Singh, "Optimizing UI Layouts for Deformable Face-Rig
+Manipulation", ACM Transactions on Graphics 40 (4), 2021. They use integer programming; here handles
+are chosen one after the other, each for controls that the earlier ones cannot reach.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from ..base.given import MOST, checked, whole
 from .surface import Doubles, Floats, Surface
 
 _MOST_CANDIDATES = 3000
-_CHUNK = 1024  # vertices whose Jacobian is made at a time
+_CHUNK = 1024  # vertices whose Jacobian is computed at a time
 
 
 def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[np.int64]:
-    """int64[n]: vertices of a mesh that make good handles, best first; n is at most count.
+    """int64[n]: vertices of a mesh that are good handles, best first; n is at most count.
 
-    Where the face is the same left and right, so are they.
+    On a symmetric face the handles are symmetric too.
 
     Args:
         surface: the face.
         mesh: an index into dna.meshes.
-        count: how many at most.
+        count: largest number of handles.
 
     Raises:
-        ValueError: a mesh that is not there, a count below 1.
+        ValueError: an unknown mesh, a count below 1.
     """
     checked("count", whole, count, 1, MOST)
     places = surface.positions(surface.rig.initial_raw_controls, mesh).astype(np.float64)
@@ -60,12 +60,12 @@ def place_handles(surface: Surface, mesh: int, count: int = 24) -> npt.NDArray[n
 
 
 def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int64]:
-    """The vertices that lie outside as one looks at the face: not the inside of the mouth.
+    """The vertices that are visible from the front, without the inside of the mouth.
 
     Args:
         places: float64[V, 3].
-        surface: knows which axis is which.
-        size: of the mesh.
+        surface: knows the axes.
+        size: size of the mesh.
     """
     depth = places @ surface.front
     flat = places[:, [surface.side, surface.up]]
@@ -77,20 +77,20 @@ def _shown(places: Doubles, surface: Surface, size: float) -> npt.NDArray[np.int
 
 
 def _reach(surface: Surface, mesh: int, vertices: npt.NDArray[np.int64]) -> Floats:
-    """float32[n, 3, R]: what each control does at rest."""
+    """float32[n, 3, R]: the effect of each control at rest."""
     rest = surface.rig.initial_raw_controls
     parts = [vertices[i : i + _CHUNK] for i in range(0, len(vertices), _CHUNK)]
     return np.concatenate([surface.jacobian(rest, mesh, part) for part in parts])
 
 
 def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[np.int64]:
-    """int64[V]: the vertex on the other side, itself in the middle, -1 where there is none.
+    """int64[V]: the vertex on the other side, itself in the middle, -1 if there is none.
 
     Args:
         places: float64[V, 3].
-        side: the axis from side to side.
-        up: the axis upwards.
-        size: of the mesh.
+        side: index of the axis from side to side.
+        up: index of the upward axis.
+        size: size of the mesh.
     """
     near = size / 300
     middle = (places[:, side].min() + places[:, side].max()) / 2
@@ -112,13 +112,13 @@ def _mirrored(places: Doubles, side: int, up: int, size: float) -> npt.NDArray[n
 
 
 def _leave_out(reach: Floats, surface: Surface, mesh: int, vertices: list[int]) -> None:
-    """Takes from all what dragging these vertices already does.
+    """Remove from all rows the directions that dragging these vertices already controls.
 
     Args:
-        reach: float32[n, 3, R], changed.
+        reach: float32[n, 3, R], changed in place.
         surface: the face.
         mesh: an index into dna.meshes.
-        vertices: that were chosen.
+        vertices: the chosen ones.
     """
     rows = surface.jacobian(surface.rig.initial_raw_controls, mesh, np.array(vertices))
     _, values, directions = np.linalg.svd(rows.reshape(-1, rows.shape[2]), full_matrices=False)

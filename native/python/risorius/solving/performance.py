@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes that move, from files, brought to where a face lies."""
+"""Reads moving meshes from files and aligns them with a face."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from ..base.npz import DAMAGED, hold_arrays
 from .surface import Doubles, Floats
 
 _SCALES = 10.0 ** np.arange(-3, 4)
-_FARTHEST = 1e9  # in any unit; squares of what lies farther leave the numbers
-_NEAR = 0.03  # of a face's size: a mesh nearer than this to an even placement is meant to be there
+_FARTHEST = 1e9  # in any unit; squares of larger values overflow
+# Of a face's size: an axis-aligned placement with a smaller error is assumed to be meant.
+_NEAR = 0.03
 
 
 class PerformanceError(RisoriusError):
@@ -29,7 +30,7 @@ class PerformanceError(RisoriusError):
 
 
 class Performance(NamedTuple):
-    """The vertices of one mesh in time."""
+    """The vertices of one mesh over time."""
 
     frames: Floats
     """float32[F, V, 3]"""
@@ -38,9 +39,9 @@ class Performance(NamedTuple):
     start: float
     """Seconds, the time of the first frame."""
     neutral: Floats | None
-    """float32[V, 3]: at rest, where the file has it."""
+    """float32[V, 3]: the mesh at rest, if the file has it."""
     note: str = ""
-    """How it was brought to the face, or empty."""
+    """The alignment that was applied, or empty."""
 
 
 def read_performance(
@@ -50,11 +51,11 @@ def read_performance(
 
     Args:
         path: the file.
-        name: of the mesh in an Alembic file; None: the first that fits.
-        counts: which numbers of vertices fit; None: any.
+        name: name of the mesh in an Alembic file; None: the first that fits.
+        counts: numbers of vertices that fit, by mesh; None: any.
 
     Raises:
-        PerformanceError: another kind of file, one that is damaged, no such mesh.
+        PerformanceError: an unknown kind of file, a damaged file, an unknown mesh.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".abc", ".npz"):
@@ -103,7 +104,7 @@ def _arrays(path: str | os.PathLike[str]) -> Performance:
     rate = float(given.item()) if given.size == 1 else np.nan
     if not (np.isfinite(rate) and rate > 0):
         raise PerformanceError(f"{path}: a rate above 0 was expected, found {given.tolist()}")
-    with np.errstate(over="ignore"):  # what leaves float32 is infinite, and refused
+    with np.errstate(over="ignore"):  # values beyond float32 become infinite and are refused
         own = None if neutral is None else neutral.astype(np.float32)
         return Performance(frames.astype(np.float32), rate, 0.0, own)
 
@@ -167,9 +168,9 @@ def _samples(path: str | os.PathLike[str], schema: Any, library: Any) -> Perform
 def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
     """The performance in a face's unit and axes.
 
-    Vertex by vertex the same topology: so the turn, the unit and the place that bring the first
-    frame nearest to the face are known. Where they are as good as a turn by right angles, a unit of
-    ten times another and no move, these are meant.
+    Vertices correspond, so that the rotation, scale and translation that bring the first frame
+    nearest to the face are known. If a rotation by right angles, a scale by a power of ten and no
+    translation fit almost as well, these are used.
 
     Args:
         take: the performance.
@@ -200,7 +201,8 @@ def fitted(take: Performance, positions: npt.ArrayLike) -> Performance:
 
 
 def _similarity(source: Doubles, target: Doubles) -> tuple[Doubles, float, Doubles]:
-    """The turn, scale and move with the least |scale turn source + move - target| (Umeyama 1991).
+    """The rotation, scale and translation that minimise |scale turn source + move - target|
+    (Umeyama 1991).
 
     Args:
         source, target: float64[V, 3].

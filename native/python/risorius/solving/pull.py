@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A drag as an equation: wanted coordinates, what controls do to them, and its least squares."""
+"""A drag as equations: target coordinates, the effect of controls on them, and their least
+squares."""
 
 from __future__ import annotations
 
@@ -14,27 +15,27 @@ from ..base.errors import ArgumentError
 from .controls import ControlLimits, ControlSharing
 from .surface import Doubles, Surface, numbers, vector, wholes
 
-ON = 1e-6  # a control that changes by less is where it was
-_GAIN = 1e-5  # of the square of the whole way: what gains less is not worth another look
+ON = 1e-6  # a smaller change of a control counts as none
+_GAIN = 1e-5  # of the squared distance: a smaller gain ends the iteration
 
 
 @dataclass
 class Drag:
-    """A drag, looked through: m rows are wanted coordinates."""
+    """A checked drag; its m rows are target coordinates."""
 
     probe: Probe
     free: npt.NDArray[np.bool_]  # [R]
     targets: Doubles  # [P, 3]
     axes: Doubles  # [P, k, 3]
-    roots: Doubles  # [P]: roots of weights
+    roots: Doubles  # [P]: square roots of the weights
     low: Doubles  # [R]
     high: Doubles  # [R]
     ease: Doubles  # [R]
     unknowns: Unknowns
-    mm: float  # of the file's unit
+    mm: float  # millimetres in the file's unit
 
     def held(self, controls: Sequence[int], at: Doubles) -> Drag:
-        """The same drag with some controls kept. Args: controls; at  where they stay, [R]."""
+        """The same drag with some controls fixed. Args: controls; at  their values, [R]."""
         low, high, free = self.low.copy(), self.high.copy(), self.free.copy()
         low[controls] = high[controls] = at[controls]
         free[controls] = False
@@ -45,17 +46,17 @@ class Drag:
         return self.probe.positions(raw)
 
     def residual(self, positions: Doubles) -> Doubles:
-        """float64[m]: what is missing. Args: positions  of the points, float64[P, 3]."""
+        """float64[m]: the weighted distances. Args: positions  of the points, float64[P, 3]."""
         apart = np.einsum("pki,pi->pk", self.axes, self.targets - positions)
         return np.asarray((apart * self.roots[:, None]).ravel())
 
     def left(self, raw: Doubles) -> float:
-        """The square of what is missing. Args: raw  a pose, float64[R]."""
+        """The squared distance. Args: raw  a pose, float64[R]."""
         missing = self.residual(self.positions(raw))
         return float(missing @ missing)
 
     def far(self, raw: Doubles) -> float:
-        """Root of the mean square of what is missing, in mm. Args: raw  a pose, float64[R]."""
+        """Root mean square distance in mm. Args: raw  a pose, float64[R]."""
         return self.error(self.residual(self.positions(raw))) * self.mm
 
     def jacobian(self, raw: Doubles) -> Doubles:
@@ -66,7 +67,7 @@ class Drag:
         return np.asarray(along.reshape(-1, len(raw)))
 
     def error(self, residual: Doubles) -> float:
-        """Root of the mean square in file units. Args: residual  float64[m]."""
+        """Root mean square in file units. Args: residual  float64[m]."""
         return float(np.sqrt(residual @ residual / max(1e-300, float(self.roots @ self.roots))))
 
 
@@ -80,13 +81,13 @@ def make_drag(
     limits: ControlLimits,
     sharing: ControlSharing,
 ) -> Drag:
-    """A drag, checked.
+    """Check the arguments and make a drag.
 
     Args:
-        surface, raw, points, targets, axes, weights, limits, sharing: as of solve_drag.
+        surface, raw, points, targets, axes, weights, limits, sharing: as in solve_drag.
 
     Raises:
-        ArgumentError: one that makes no sense.
+        ArgumentError: an invalid argument.
     """
     dragged = wholes("points", points)
     count = len(dragged) if dragged.ndim else 0
@@ -108,7 +109,7 @@ def make_drag(
     probe = surface.probe(dragged)
     easy = vector("ease", 1.0 if sharing.ease is None else sharing.ease, len(raw))
     unknowns = _unknowns(len(raw), sharing.partners, easy)
-    # A pair is as ready as its readier half: the other half alone would hold both back.
+    # A pair has the larger ease of its two halves, because the other half alone would hold it back.
     pair = easy.copy()
     pair[unknowns.first] = pair[unknowns.second] = unknowns.ease
     return Drag(probe, free, wanted, along, np.sqrt(weight), low, high, pair, unknowns, surface.mm)
@@ -116,15 +117,15 @@ def make_drag(
 
 @dataclass
 class Unknowns:
-    """What is solved for: each a change of a control, or of a control and its partner alike."""
+    """The unknowns: each is the change of one control, or of a control and its partner together."""
 
     first: npt.NDArray[np.int64]  # [U] controls
-    second: npt.NDArray[np.int64]  # [U] their partners, themselves where they have none
-    ease: Doubles  # [U]: of two partners that of the readier one
-    scale: Doubles  # [U]: what a unit of an unknown changes each of its controls by
+    second: npt.NDArray[np.int64]  # [U] their partners, or the controls themselves
+    ease: Doubles  # [U]: of two partners the larger ease
+    scale: Doubles  # [U]: change of each control per unit of the unknown
 
     def alike(self) -> Unknowns:
-        """The same, each as ready as the others."""
+        """The same unknowns with equal ease."""
         return replace(self, ease=np.ones_like(self.ease), scale=self.scale / self.ease)
 
     def columns(self, jacobian: Doubles) -> Doubles:
@@ -167,13 +168,13 @@ def _unknowns(count: int, partners: npt.ArrayLike | None, ease: Doubles) -> Unkn
 def least_squares(
     drag: Drag, begin: Doubles, start: Doubles, smallest: float, rounds: int
 ) -> Doubles:
-    """Gauss-Newton, whose whole change from the begin is kept small, with halved steps.
+    """Gauss-Newton with halved steps; keeps the whole change from the begin small.
 
     Args:
         drag: the drag.
-        begin: float64[R], the pose from which a change is small.
-        start: float64[R], the pose to go on from.
-        smallest, rounds: as of solve_drag.
+        begin: float64[R], the pose from which changes are counted.
+        start: float64[R], the initial pose.
+        smallest, rounds: as in solve_drag.
     """
     at = np.clip(start, drag.low, drag.high)
     missing = drag.residual(drag.positions(at))
@@ -181,7 +182,7 @@ def least_squares(
     low, high = drag.unknowns.limits(drag.low - begin, drag.high - begin)
     for _ in range(max(1, rounds)):
         jacobian = drag.unknowns.columns(drag.jacobian(at))
-        if price < 0:  # the same all along, so that what one round gains no other gives away
+        if price < 0:  # constant, so that no round gives up the gain of another
             strongest = float((jacobian**2).sum(axis=0).max(initial=0))
             price = max(smallest**2 * strongest, 1e-20)
         here = drag.unknowns.values(at - begin)
@@ -202,7 +203,8 @@ def least_squares(
 
 
 def seen_from(drag: Drag, begin: Doubles, at: Doubles) -> tuple[Doubles, Doubles]:
-    """The derivatives at a pose, float64[m, U], and what changes from the begin have to give.
+    """The derivatives at a pose, float64[m, U], and the residual in terms of changes from the
+    begin.
 
     Args:
         drag: the drag.

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The cheapest change of a few that does a job: what a drag moves, and what it leaves alone.
+"""Finds the cheapest sparse change for a task: which controls a drag moves, and which stay.
 
-Basis pursuit between bounds, by the path of the lasso: M. R. Osborne, B. Presnell and B. A.
-Turlach, "A new approach to variable selection in least squares problems", IMA Journal of Numerical
-Analysis 20 (3), 2000. The cheapest change is a continuous function of what is wanted, so a stroke
-pops from no set of sliders to another, and has at most about as many sliders as rows.
+Basis pursuit with bounds, by the path of the lasso: M. R. Osborne, B. Presnell and B. A. Turlach,
+"A new approach to variable selection in least squares problems", IMA Journal of Numerical Analysis
+20 (3), 2000. The cheapest change is a continuous function of the target, so that a stroke does not
+jump from one set of sliders to another, and it has at most about as many sliders as rows.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from .surface import Doubles
 
 _REST, _MOVES, _BOUND = 0, 1, 2
 _MOST_STEPS = 600
-_MOST_MORE = 60  # steps of a walk to a given distance: where it is longer, its end is not cheap
-_END = 1e-6  # of the price at which the first moves: where the path counts as walked to its end
-_FAR = 0.1  # of the whole way: a target that stays farther away than this is out of reach
-_LITTLE = 0.1  # of what can be gained: what may be missed there for the sake of few controls
-_CALM = 0.12  # of the first price: from there on controls hardly help with such a target
-_LEVEL = 1e-9  # what differs by less than this from a slope is as steep
+_MOST_MORE = 60  # steps of a path to a given distance; the result of a longer path is not cheap
+_END = 1e-6  # of the first price: the path ends here
+_FAR = 0.1  # of the whole way: a target that stays farther away is out of reach
+_LITTLE = 0.1  # of the possible gain: may be given up there to use fewer controls
+_CALM = 0.12  # of the first price: below it controls hardly help with such a target
+_LEVEL = 1e-9  # a smaller difference of slopes counts as none
 
 
 @dataclass
 class _Path:
-    """A walk from no change to the nearest, by a falling price of a unit of change.
+    """The path from no change to the nearest point, by a falling price per unit of change.
 
-    Everything is in units whose price is 1.
+    All values are scaled so that each price is 1.
     """
 
     a: Doubles  # [m, n]
@@ -43,7 +43,7 @@ class _Path:
     sign: Doubles = field(init=False)
     pull: Doubles = field(init=False)
     price: float = field(init=False)
-    left: int = -1  # what came to rest in the last step
+    left: int = -1  # came to rest in the last step
 
     def __post_init__(self) -> None:
         count = self.a.shape[1]
@@ -53,18 +53,18 @@ class _Path:
         self.price = float(self._wish().max(initial=0.0))
 
     def _wish(self) -> Doubles:
-        """float64[n]: how much each that rests is pulled to where it has room."""
+        """float64[n]: the pull on each resting unknown that has room in that direction."""
         room = np.where(self.pull > 0, self.high > 0, self.low < 0) & (self.state == _REST)
         return np.where(room, np.abs(self.pull), 0.0)
 
     def step(self, end: float) -> int:
-        """Go on until one begins to move, stops, or moves again.
+        """Follow the path until an unknown begins to move, stops, or leaves a bound.
 
         Args:
-            end: the price to end at.
+            end: the price at which to end.
 
         Returns:
-            The one that began to move from rest, or -1.
+            The unknown that began to move from rest, or -1.
         """
         if not (self.state == _MOVES).any():
             wish = self._wish()
@@ -108,7 +108,7 @@ class _Path:
         self.state[which], self.sign[which] = _MOVES, np.sign(self.pull[which])
 
     def _stops(self, rate: Doubles) -> tuple[Doubles, Doubles]:
-        """Where each that moves stops, and after how much of the price."""
+        """Where each moving unknown stops, and after which decrease of the price."""
         stop = np.where(rate > 0, self.high, self.low)
         back = (self.x * rate < 0) | ((self.x == 0) & (rate * self.sign < 0))
         stop = np.where(back, 0.0, stop)
@@ -117,7 +117,8 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """After how much of the price each that rests begins to move, and to which side."""
+        """The decrease of the price after which each resting unknown begins to move, and its
+        direction."""
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False
@@ -131,7 +132,7 @@ class _Path:
         return np.minimum(up, down), np.where(up <= down, 1.0, -1.0)
 
     def _moves_again(self, slope: Doubles) -> Doubles:
-        """After how much of the price each that is at a bound leaves it."""
+        """The decrease of the price after which each unknown at a bound leaves it."""
         falls = self.sign * slope - 1
         there = (self.state == _BOUND) & (falls > _LEVEL)
         if self.left >= 0:
@@ -150,16 +151,16 @@ def cheapest_change(
     tolerance: float,
     worth: float,
 ) -> Doubles:
-    """The cheapest x that brings a x near to b: float64[n], most of them 0.
+    """The cheapest x that brings a x near to b: float64[n], mostly 0.
 
     Args:
         a: float64[m, n].
         b: float64[m].
-        low, high: float64[n], at most and at least 0.
-        price: float64[n] above 0, of a unit of each.
-        elsewhere: bool[n], those of a price so high that the others come first.
-        tolerance: how much farther from b than the nearest it may end.
-        worth: how much nearer those elsewhere have to bring it.
+        low, high: float64[n]; low is at most 0, high at least 0.
+        price: float64[n] above 0, price per unit.
+        elsewhere: bool[n], unknowns with a price so high that the others come first.
+        tolerance: allowed distance beyond the nearest possible one.
+        worth: improvement that unknowns elsewhere must bring.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
     nodes, end, alone = [(path.x.copy(), path.missing)], _END * path.price, -1.0
@@ -176,22 +177,22 @@ def cheapest_change(
     aim = aim + tolerance if alone < 0 else min(alone + tolerance, aim + max(worth, tolerance))
     way, near = float(np.linalg.norm(b)), nearest if alone < 0 else alone
     if nearest > _FAR * way and near - nearest <= _FAR * way:
-        # Out of reach: controls that hardly help any more are left alone.
+        # Out of reach: controls that hardly help are left out.
         there = _at_price(nodes, prices, calm)
         aim = max(aim, there) if there - near <= _LITTLE * (way - near) else aim
-    return np.clip(_where(nodes, aim) / price, low, high)  # rounding must not leave the bounds
+    return np.clip(_where(nodes, aim) / price, low, high)  # rounding must not exceed the bounds
 
 
 def cheapest_to(
     a: Doubles, b: Doubles, low: Doubles, high: Doubles, price: Doubles, aim: float
 ) -> Doubles:
-    """The cheapest x that brings a x as near to b as asked for, or as near as any: float64[n].
+    """The cheapest x that brings a x within a distance of b, or as near as possible: float64[n].
 
     Args:
         a: float64[m, n].
         b: float64[m].
-        low, high: float64[n], at most and at least 0.
-        price: float64[n] above 0, of a unit of each.
+        low, high: float64[n]; low is at most 0, high at least 0.
+        price: float64[n] above 0, price per unit.
         aim: the distance.
     """
     path = _Path(a / price, b.copy(), low * price, high * price)
@@ -205,7 +206,7 @@ def cheapest_to(
 
 
 def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: float) -> float:
-    """How much is missing where the price has fallen so far."""
+    """The residual at the point of the path with this price."""
     for (_, long), (_, short), before, after in zip(
         nodes, nodes[1:], prices, prices[1:], strict=False
     ):
@@ -216,7 +217,7 @@ def _at_price(nodes: list[tuple[Doubles, Doubles]], prices: list[float], price: 
 
 
 def _where(nodes: list[tuple[Doubles, Doubles]], aim: float) -> Doubles:
-    """The first place on a way whose second vector is as short as `aim`."""
+    """The first point of a path whose residual is at most `aim`."""
     for (x, long), (then, short) in pairwise(nodes):
         if np.linalg.norm(short) <= aim:
             by = short - long

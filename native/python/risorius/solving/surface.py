@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Vertices of a face as a function of its raw controls, and what each control does to them."""
+"""Vertices of a face as a function of its raw controls, and their derivatives."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from ..base.given import LARGEST, MOST, shown
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 MM = {"cm": 10.0, "m": 1000.0}
-_LOOKED_AT = 2000  # about so many vertices tell what a control moves most
+_LOOKED_AT = 2000  # number of vertices that is enough to find a control's largest effect
 
 
 class Surface:
-    """The meshes of a face, skinned and shaped as the evaluated rig says.
+    """The meshes of a face, skinned and shaped by the evaluated rig.
 
-    Positions are in the file's units and axes. What turns the neck or the head outside of the
-    face's own controls takes no part: it is the head's own space.
+    Positions are in the file's units and axes, in the space of the head: turns of neck and head
+    outside of the face's own controls are not included.
 
     Attributes:
         rig: the compiled face.
         lod: the level of detail that is evaluated.
-        mesh_indices: the meshes of that LOD, indices into dna.meshes.
-        vertex_counts: of each mesh of the file.
-        mm: millimetres of the file's unit.
-        side, up: which axis goes from side to side, and which up or down.
-        front: float64[3], the direction in which the face looks.
+        mesh_indices: the meshes of that LOD, as indices into dna.meshes.
+        vertex_counts: vertex counts of each mesh of the file.
+        mm: millimetres in the file's unit.
+        side, up: indices of the axis from side to side and of the vertical axis.
+        front: float64[3], the direction of the face.
     """
 
     def __init__(self, dna: Dna, rig: Rig, lod: int = 0) -> None:
-        """Take a copy of what is needed of a face.
+        """Copy the needed parts of a face.
 
         Args:
             dna: the file, with its geometry.
@@ -44,8 +44,8 @@ class Surface:
             lod: from 0, below the number of LODs.
 
         Raises:
-            DnaError: lists that do not fit each other, a rig that does not fit the file.
-            ValueError: a LOD that is not there.
+            DnaError: inconsistent lists, a rig that does not fit the file.
+            ValueError: an unknown LOD.
         """
         _below("lod: a LOD", lod, max(1, rig.lod_count))
         self._skins = Skins(dna, rig, lod)
@@ -53,7 +53,7 @@ class Surface:
         self.vertex_counts = [len(mesh.positions) for mesh in dna.meshes]
         mapping = dna.lod_mesh_mapping
         listed = mapping[lod].tolist() if lod < len(mapping) else []
-        # A file may name meshes and not hold them.
+        # A file may name meshes without holding them.
         self.mesh_indices = [m for m in listed if m < len(self.vertex_counts)]
         self._size = dna.size_in_bytes()
         self.mm = MM.get(dna.translation_unit, 10.0)
@@ -61,7 +61,7 @@ class Surface:
         self._look_at_axes(dna.coordinate_system)
 
     def _look_at_axes(self, directions: Sequence[str]) -> None:
-        """What the file's axes are: left and right, up, and float64[3] to the front."""
+        """The meaning of the file's axes: left and right, up, and float64[3] to the front."""
         kinds = {"left": 0, "right": 0, "up": 1, "down": 1, "front": 2, "back": 2}
         axes = [kinds.get(name, -1) for name in directions]
         if sorted(axes) != [0, 1, 2]:
@@ -73,7 +73,7 @@ class Surface:
     def positions(
         self, raw: npt.ArrayLike, mesh: int, vertices: npt.ArrayLike | None = None
     ) -> Floats:
-        """Where raw controls bring vertices: float32[V, 3].
+        """Positions of vertices under raw controls: float32[V, 3].
 
         Args:
             raw: float[R].
@@ -81,7 +81,7 @@ class Surface:
             vertices: int[V]; None is all.
 
         Raises:
-            ValueError: an index that is out of range, a value that is no number.
+            ValueError: an index out of range, a value that is not a number.
         """
         at = self.controls(raw)
         probe = self.probe(self._points(mesh, vertices))
@@ -95,10 +95,10 @@ class Surface:
         lowest: npt.ArrayLike | None = None,
         highest: npt.ArrayLike | None = None,
     ) -> Floats:
-        """What each control does to vertices at a pose, per unit of it: float32[V, 3, R].
+        """The derivatives of vertices by each control at a pose: float32[V, 3, R].
 
-        By differences of the evaluated rig, so correctives, solvers and networks count; to the side
-        that the limits leave.
+        Differences of the evaluated rig, so that correctives, solvers and networks are included;
+        taken towards the side that the limits allow.
 
         Args:
             raw: float[R], the pose.
@@ -107,7 +107,7 @@ class Surface:
             lowest, highest: float[R] or one number; None is 0 and 1.
 
         Raises:
-            ValueError: an index that is out of range, a value that is no number.
+            ValueError: an index out of range, a value that is not a number.
         """
         at = self.controls(raw)
         _, high = limits(len(at), lowest, highest)
@@ -118,19 +118,19 @@ class Surface:
         return probe.jacobian()
 
     def strongest(self) -> Doubles:
-        """How far each control moves what it moves most, per unit of it from rest: float64[R].
+        """The largest displacement by each control, per unit from rest: float64[R].
 
-        Of some thousand vertices, spread evenly over the meshes of the level; found once.
+        Measured once, on some thousand vertices spread evenly over the meshes of the level.
         """
         return self._far().max(axis=0, initial=0.0)
 
     def spread(self) -> Doubles:
-        """Root of the mean square of how far each control moves those vertices: float64[R]."""
+        """Root mean square displacement of these vertices by each control: float64[R]."""
         far = self._far()
         return np.asarray(np.sqrt(np.square(far).sum(axis=0) / max(1, len(far))))
 
     def _far(self) -> Doubles:
-        """float64[V, R]: how far each control moves some thousand vertices."""
+        """float64[V, R]: displacement of some thousand vertices by each control."""
         if self._moved is None:
             count = self.control_count
             every = max(1, sum(self.vertex_counts[m] for m in self.mesh_indices) // _LOOKED_AT)
@@ -144,13 +144,13 @@ class Surface:
         return self._moved
 
     def probe(self, points: npt.NDArray[np.int64]) -> Probe:
-        """Points of the surface that can be asked often.
+        """Points of the surface for repeated queries.
 
         Args:
             points: int64[P, 2], mesh and vertex.
 
         Raises:
-            ValueError: an index that is out of range.
+            ValueError: an index out of range.
         """
         counts = np.array([*self.vertex_counts, 0])
         mesh, vertex = points.T
@@ -163,23 +163,23 @@ class Surface:
         return Probe(self._skins, points.astype(np.uint32))
 
     def check_size(self, points: int) -> None:
-        """Before derivatives of some points by all controls are held, and their products.
+        """Check the size of derivatives of points by all controls, and of their products.
 
         Args:
-            points: how many.
+            points: their number.
 
         Raises:
-            BudgetError: that is far more than the face, as of one with very many raw controls.
+            BudgetError: far larger than the face, as with very many raw controls.
         """
         count = self.control_count
         place = f"what {count:,} raw controls do to {points:,} points"
         Budget.of(self._size).hold(12 * points * count + 8 * count**2, place)
 
     def controls(self, raw: npt.ArrayLike) -> Floats:
-        """float32[R] of what a caller gave.
+        """The caller's controls as float32[R].
 
         Raises:
-            ValueError: another shape, a value that is no number.
+            ValueError: a wrong shape, a value that is not a number.
         """
         return vector("raw", raw, self.control_count).astype(np.float32)
 
@@ -203,14 +203,14 @@ def _below(what: str, found: object, end: int) -> None:
 
 
 def numbers(name: str, values: npt.ArrayLike) -> Doubles:
-    """float64[...] of what a caller gave.
+    """A caller's numbers as float64[...].
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         values: numbers of any shape.
 
     Raises:
-        ValueError: no numbers, or some that a float32 does not hold.
+        ValueError: not numbers, or beyond float32.
     """
     try:
         out = np.asarray(values, np.float64)
@@ -222,14 +222,14 @@ def numbers(name: str, values: npt.ArrayLike) -> Doubles:
 
 
 def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
-    """int64[...] of what a caller gave.
+    """A caller's integers as int64[...].
 
     Args:
-        name: of the argument.
-        values: whole numbers of any shape.
+        name: name of the argument.
+        values: integers of any shape.
 
     Raises:
-        ValueError: no whole numbers, or larger ones.
+        ValueError: not integers, or too large.
     """
     if isinstance(values, np.ndarray) and values.dtype.kind in "iu" and values.dtype != np.uint64:
         return values.astype(np.int64, copy=False)
@@ -240,15 +240,15 @@ def wholes(name: str, values: npt.ArrayLike) -> npt.NDArray[np.int64]:
 
 
 def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
-    """float64[count] of what a caller gave.
+    """A caller's numbers as float64[count].
 
     Args:
-        name: of the argument.
+        name: name of the argument.
         values: one number for all, or one for each.
-        count: how many there must be.
+        count: the required number.
 
     Raises:
-        ValueError: another shape, a value that is no number.
+        ValueError: a wrong shape, a value that is not a number.
     """
     out = numbers(name, values)
     if out.shape not in ((), (count,)):
@@ -259,7 +259,7 @@ def vector(name: str, values: npt.ArrayLike, count: int) -> Doubles:
 def limits(
     count: int, lowest: npt.ArrayLike | None, highest: npt.ArrayLike | None
 ) -> tuple[Doubles, Doubles]:
-    """float64[R] twice: between which values each control may be.
+    """float64[R] twice: the range of each control.
 
     Args:
         count: R.
@@ -267,7 +267,7 @@ def limits(
         highest: float[R] or one number; None is 1.
 
     Raises:
-        ValueError: another shape, no number, a lowest above its highest.
+        ValueError: a wrong shape, not a number, a lowest above its highest.
     """
     low = vector("lowest", 0.0 if lowest is None else lowest, count)
     high = vector("highest", 1.0 if highest is None else highest, count)

@@ -25,7 +25,7 @@ from .phones import Phoneme
 __all__ = ["AudioError", "CancelledError", "Heard", "Phoneme", "animate", "listen", "mouth",
            "phonemes", "sheets", "speak"]  # fmt: skip
 
-_TAIL = 0.3  # seconds after the sound, in which the mouth comes to rest
+_TAIL = 0.3  # seconds after the sound in which the mouth closes
 
 
 def phonemes(
@@ -38,7 +38,7 @@ def phonemes(
     """The phonemes of a voice with their times, in order and without gaps; pauses are SIL.
 
     Args:
-        path, transcript, progress, cancel: as of speak.
+        path, transcript, progress, cancel: as in speak.
 
     Raises:
         AudioError, MissingError, CancelledError: as speak does.
@@ -60,30 +60,30 @@ def speak(
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Clip:
-    """A face that says what is heard in a sound file.
+    """Animates a face that says the words of a sound file.
 
     Args:
-        path: a WAV file, or anything that an ffmpeg on PATH can read.
-        transcript: what is said, in English, if that is known: the mouth is much better with it.
+        path: a WAV file, or any file that an ffmpeg on PATH can read.
+        transcript: the spoken words in English, if known: the mouth is much better with it.
         rate: frames per second of the clip.
-        seed: of the blinks. The same file and arguments always give the same clip.
-        intensity: scales the shapes of the mouth, the brows and the nods; lips close all the same.
-        blinks: whether to blink.
-        accents: whether brows and head follow what is stressed.
-        correctable: whether the metadata shall hold what `mouth` needs beside the phonemes.
-        library: the face's own expressions by name: its visemes are taken instead of ours.
-        progress: called with 0 to 1 now and then.
-        cancel: asked now and then; true ends the work with CancelledError.
+        seed: seed of the blinks. The same file and arguments always give the same clip.
+        intensity: scales mouth shapes, brows and nods; lips still close completely.
+        blinks: add blinks.
+        accents: let brows and head follow stressed syllables.
+        correctable: add the data to the metadata that `mouth` needs in addition to the phonemes.
+        library: the face's own expressions by name: its visemes replace ours.
+        progress: called with 0 to 1 from time to time.
+        cancel: called from time to time; if it returns true, CancelledError is raised.
 
     Returns:
-        A clip of raw controls and head.pitch, from the begin of the sound to 0.3 s after its end.
-        Its events are "word" and "phoneme", the value says which; metadata: source, transcript,
-        speech ("aligned" or "recognised"), notes where something went otherwise than asked;
-        of a correctable one seconds (of the sound) and openness (whole thousandths).
+        A clip of raw controls and head.pitch, from the beginning of the sound to 0.3 s after its
+        end. Its events "word" and "phoneme" have the word or phoneme as value. Metadata: source,
+        transcript, speech ("aligned" or "recognised"), and notes about deviations; with correctable
+        also seconds (length of the sound) and openness (integers, thousandths).
 
     Raises:
-        AudioError: the file cannot be used. ValueError: a transcript without English words, a rate
-            or an intensity out of range, or PocketSphinx is not installed. CancelledError.
+        AudioError: an unusable file. ValueError: a transcript without English words, a rate or an
+            intensity out of range, or PocketSphinx is not installed. CancelledError.
     """
     _check(rate, intensity)
     heard = listen(path, transcript, progress=progress, cancel=cancel)
@@ -108,14 +108,14 @@ def animate(
     correctable: bool = False,
     library: Mapping[str, Expression] | None = None,
 ) -> Clip:
-    """The clip of what was heard.
+    """The clip of a heard voice.
 
     Args:
-        heard: of `listen`.
-        rate, seed, intensity, blinks, accents, correctable, library: as of speak.
+        heard: from `listen`.
+        rate, seed, intensity, blinks, accents, correctable, library: as in speak.
 
     Raises:
-        ValueError: a rate or an intensity that makes no sense.
+        ValueError: an invalid rate or intensity.
     """
     _check(rate, intensity)
     duration = len(heard.samples) / RATE
@@ -146,20 +146,20 @@ def mouth(
     intensity: float = 1.0,
     library: Mapping[str, Expression] | None = None,
 ) -> dict[str, npt.NDArray[np.float64]]:
-    """The curves of lips, jaw and tongue alone; what a voice does besides, it does not touch.
+    """The curves of lips, jaw and tongue only.
 
     Args:
         phonemes: in order, without gaps; the mouth rests before and after them.
-        opened: [n], how far vowels open: of prosody.openness, or the thousandths of a correctable
+        opened: [n], opening of vowels: from prosody.openness, or the thousandths in a correctable
             clip's metadata / 1000.
         times: seconds, ascending in equal steps, [frames].
-        intensity, library: as of speak.
+        intensity, library: as in speak.
 
     Returns:
         Raw control -> float64[frames] in [0, 1].
     """
     begin, end = (phonemes[0].begin, phonemes[-1].end) if phonemes else (0.0, 0.0)
-    # Silence around the sound, or the mouth would never come to rest after the last word.
+    # Silence around the sound, so that the mouth comes to rest after the last word.
     rest = [Phoneme(begin - 1.0, begin, "SIL"), *phonemes, Phoneme(end, end + 1.0, "SIL")]
     weights = articulation.viseme_weights(rest, times)
     open_far = prosody.openness_at(np.asarray(opened, np.float64), times)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Speech in a process of its own.
+"""Speech recognition in a separate process.
 
-A program that carries Python, as Blender does, may hold another libpocketsphinx already: brought by
-its ffmpeg, the linker gives its functions to the recogniser too, which then fails or crashes. In a
-process of its own the recogniser has nothing beside it, a crash of it is a sentence, and it can be
-ended at any moment.
+A program that embeds Python, such as Blender, may have loaded another libpocketsphinx through its
+ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. In a
+separate process this cannot happen, a crash becomes an error message, and the process can be ended
+at any moment.
 
     here                                         there
     one line of JSON: what to do         -->     speak()
@@ -39,8 +39,8 @@ from .audio import AudioError
 from .listening import Cancel, CancelledError, Progress
 from .recogniser import MissingError
 
-_PATIENCE = 3600.0  # seconds without a word: a long voice is aligned in one go
-_ASKED = 0.05  # seconds between two questions whether to cancel
+_PATIENCE = 3600.0  # seconds without a message, because a long voice is aligned in one step
+_ASKED = 0.05  # seconds between two calls of cancel
 _BEGIN = (
     "import json, sys; task = json.loads(sys.stdin.buffer.readline()); sys.path[:] = task['paths'];"
     "from risorius.speech import apart; apart.serve(task)"
@@ -53,7 +53,7 @@ _ERRORS: dict[str, type[Exception]] = {
 
 
 class RecogniserError(RisoriusError):
-    """The process of the recogniser could not be started, or ended by itself; one sentence."""
+    """The process of the recogniser could not be started, or ended unexpectedly; one sentence."""
 
     code = "recogniser"
 
@@ -66,14 +66,14 @@ def speak_apart(
     cancel: Cancel | None = None,
     **options: Any,
 ) -> Clip:
-    """As speak, in a process of its own, which is ended at once when cancel() is true.
+    """Like speak, in a separate process that is ended at once when cancel() returns true.
 
     Args:
-        path, transcript, progress, cancel, options: as of speak. Both are called from the thread
-            that calls this, which waits.
+        path, transcript, progress, cancel, options: as in speak. progress and cancel are called
+        from the calling thread, which waits.
 
     Raises:
-        RecogniserError: the process could not be started, or ended by itself. What speak raises.
+        RecogniserError: the process could not be started, or ended unexpectedly. Also as speak.
     """
     task = {
         "paths": [os.path.abspath(place) for place in sys.path],
@@ -81,7 +81,8 @@ def speak_apart(
         "transcript": transcript,
         "options": {**options, "library": _texts(options.get("library"))},
     }
-    # Error messages of the process go into a file: a full pipe that nobody reads would block it.
+    # Error messages of the process go to a file, because a full pipe without a reader would block
+    # it.
     with tempfile.TemporaryFile() as said, _started(said) as process:
         try:
             _write(process, task)
@@ -99,7 +100,7 @@ def speak_apart(
 
 
 def _texts(library: Mapping[str, Expression] | None) -> dict[str, str] | None:
-    """Expressions as text, which goes through a pipe."""
+    """Expressions as text, for the pipe."""
     if library is None:
         return None
     return {name: expressions.text_of(one) for name, one in library.items()}
@@ -130,7 +131,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
 
 
 def python_program() -> str:
-    """The program of the running Python; sys.executable may be the one that Python is built into.
+    """The program of the running Python; sys.executable may be a program that embeds Python.
 
     Raises: RecogniserError.
     """
@@ -153,11 +154,11 @@ def _write(process: subprocess.Popen[bytes], task: dict[str, Any]) -> None:
         process.stdin.write(json.dumps(task).encode() + b"\n")
         process.stdin.flush()
     except OSError:
-        pass  # the process has ended; the reader of its messages reports how
+        pass  # the process has ended; the reader of its messages reports it
 
 
 def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterator[dict[str, Any]]:
-    """What the process says, until it ends. Raises: CancelledError, RecogniserError."""
+    """The messages of the process until it ends. Raises: CancelledError, RecogniserError."""
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_hand_over, args=(process.stdout, lines), daemon=True).start()
     heard = monotonic()
@@ -183,7 +184,7 @@ def _hand_over(pipe: IO[bytes], lines: queue.SimpleQueue[bytes]) -> None:
         for line in pipe:
             lines.put(line)
     except (OSError, ValueError):
-        pass  # the parent closed the pipe while this thread was reading it
+        pass  # the parent closed the pipe during the read
     lines.put(b"")
 
 
@@ -209,8 +210,8 @@ def _clip_of(message: dict[str, Any]) -> Clip:
 
 
 def serve(task: dict[str, Any]) -> None:
-    """The other end: do what the line says, and end the process."""
-    # Text that a library prints must not get between the lines of the protocol.
+    """Runs in the separate process: do the task and end the process."""
+    # Text that a library prints must not mix with the lines of the protocol.
     words = os.fdopen(os.dup(1), "w", encoding="ascii")
     os.dup2(2, 1)
 
@@ -218,7 +219,7 @@ def serve(task: dict[str, Any]) -> None:
         words.write(json.dumps(message) + "\n")
         words.flush()
 
-    with contextlib.suppress(ImportError):  # before a pipe is read: Windows waits
+    with contextlib.suppress(ImportError):  # before a pipe is read, because Windows waits for it
         importlib.import_module("pocketsphinx")
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
@@ -236,16 +237,16 @@ def serve(task: dict[str, Any]) -> None:
             events=clip.events,
             metadata=clip.metadata,
         )
-    except Exception as error:  # noqa: BLE001  told to who waits, as a sentence
+    except Exception as error:  # noqa: BLE001  reported to the parent as a sentence
         kind = next((c.__name__ for c in type(error).__mro__ if c.__name__ in _ERRORS), "")
         known = kind or isinstance(error, OSError)
         tell(error=str(error) if known else f"{type(error).__name__}: {error}", kind=kind)
 
 
 def _end_with_parent() -> None:
-    """Wait until the pipe closes, be it that who began this has died.
+    """Wait until the pipe closes, for example because the parent died.
 
-    Read below Python's own buffer, which could not be locked when Python ends.
+    Reads below Python's buffers, whose locks would block at Python's exit.
     """
     while os.read(0, 4096):
         pass

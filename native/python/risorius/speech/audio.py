@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sound files as samples: WAV of any common kind, other formats through ffmpeg, and resampling."""
+"""Sound files as samples: all common kinds of WAV, other formats through ffmpeg, and resampling."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from ..base.reading import ReadingError, read_file
 Samples = npt.NDArray[np.float32]
 
 RATE = 16000
-"""Samples a second of everything that listens here: what the acoustic model was trained on."""
+"""Sample rate of all speech code, which is that of the acoustic model's training data."""
 
 _LOWEST_RATE, _HIGHEST_RATE = 4000, 768000
 _MOST_CHANNELS = 64
 _MOST_BYTES = 2**31  # three hours of stereo at 48 kHz and 32 bit
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
-_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # what programs that write to a pipe leave in the size fields
+_LENGTH_UNKNOWN = (0, 0xFFFFFFFF)  # values that programs writing to a pipe leave in the size fields
 
 
 class AudioError(RisoriusError):
-    """A sound file that cannot be used; the sentence names the file and says why."""
+    """An unusable sound file; the sentence names the file and the reason."""
 
     code = "audio"
 
@@ -49,11 +49,11 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
             ffmpeg on PATH can read.
 
     Returns:
-        float32[samples], full scale is 1; and the samples a second. Several channels become their
-        mean, or the loudest of them where the mean cancels out.
+        float32[samples], full scale is 1; and the samples per second. Several channels become their
+        mean, or the loudest one if the mean cancels out.
 
     Raises:
-        AudioError: it cannot be opened, is no sound, is damaged, or has no samples.
+        AudioError: the file cannot be opened, is not sound, is damaged, or has no samples.
     """
     try:
         data = read_file(path, _MOST_BYTES)
@@ -79,11 +79,11 @@ def read_audio(path: str | os.PathLike[str]) -> tuple[Samples, int]:
 
 
 class _OtherKindError(AudioError):
-    """A sound WAV file of a kind that is ffmpeg's to read."""
+    """A valid WAV file of a kind that only ffmpeg reads."""
 
 
 def parse_wav(data: bytes) -> tuple[Samples, int]:
-    """The samples of a WAV file's bytes, as read_audio gives them.
+    """The samples in the bytes of a WAV file, as in read_audio.
 
     Raises:
         AudioError: without the name of the file.
@@ -168,22 +168,22 @@ def _one_channel(channels: Samples) -> Samples:
     """float32[samples] of [samples, channels]."""
     mean = channels.mean(axis=1, dtype=np.float32)
     power = np.square(channels, dtype=np.float64).mean(axis=0)
-    # A microphone pair wired against each other cancels out, and with it the voice.
+    # Two microphones with opposite polarity cancel each other and the voice.
     if np.square(mean, dtype=np.float64).mean() < 0.05 * power.max():
         return np.ascontiguousarray(channels[:, int(np.argmax(power))])
     return mean
 
 
 def _converted(path: str | os.PathLike[str], found: str) -> bytes:
-    """A file's sound as the bytes of a WAV file, by ffmpeg."""
-    if not os.path.isfile(path):  # ffmpeg would wait for what was read already
+    """A file's sound converted to the bytes of a WAV file by ffmpeg."""
+    if not os.path.isfile(path):  # ffmpeg would wait for data that was read already
         raise AudioError(f"{path}: {found}; other formats are read of files, and not of pipes")
     program = shutil.which("ffmpeg")
     if program is None:
         raise AudioError(
             f"{path}: {found}; other formats are read through ffmpeg, which is not on PATH"
         )
-    # A file: prefix keeps a name from being read as an address or an option.
+    # The file: prefix keeps a name from being taken as an address or an option.
     source = f"file:{os.path.abspath(path)}"
     # fmt: off
     done = subprocess.run(
@@ -200,10 +200,10 @@ def _converted(path: str | os.PathLike[str], found: str) -> bytes:
 
 def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
     """Samples at another rate: a polyphase filter, a sinc in a Kaiser window (80 dB, flat to 91 %
-    of the lower of the two bands).
+    of the lower band).
 
     Args:
-        samples: float32[n] at `source` samples a second.
+        samples: float32[n] at `source` samples per second.
 
     Returns:
         float32[n * target / source], rounded up; sample i is at i / target seconds.
@@ -213,7 +213,7 @@ def resample(samples: Samples, source: int, target: int = RATE) -> Samples:
     divisor = int(np.gcd(source, target))
     up, down = target // divisor, source // divisor
     count = -(-len(samples) * up // down)
-    band = 0.955 * min(1.0, target / source)  # of the source's own band
+    band = 0.955 * min(1.0, target / source)  # as a share of the source's band
     reach = int(np.ceil(56.0 / band))  # samples of the source on each side
     padded = np.concatenate([np.zeros(reach, np.float32), samples, np.zeros(reach + 1, np.float32)])
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a face does besides its mouth while it speaks: blinks, brows, nods."""
+"""Movements of a speaking face in addition to the mouth: blinks, brows, nods."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from .prosody import Accent
 _PREFIX = "CTRL_expressions."
 _USUAL_GAP, _GAP_SPREAD = 3.2, 0.45  # seconds between blinks, and the sigma of its logarithm
 _SHORTEST_GAP = 0.9
-_PULL = 1.2  # seconds by which a blink moves to a pause of the speech
+_PULL = 1.2  # seconds by which a blink may move to a pause
 _LID_DOWN, _LID_CLOSED, _LID_UP = 0.08, 0.035, 0.17  # seconds
 _BROW = {"browRaiseInL": 0.32, "browRaiseInR": 0.32, "browRaiseOuterL": 0.4,
          "browRaiseOuterR": 0.4}  # fmt: skip
-_NOD = 0.05  # radians down, of the strongest accent
+_NOD = 0.05  # radians down, at the strongest accent
 
 
 def bump(times: Times, begin: float, rise: float, hold: float, fall: float) -> Curves:
-    """0, smoothly up to 1, held, and smoothly back: float64[frames].
+    """Rises smoothly from 0 to 1, holds, and falls back: float64[frames].
 
     Args:
         times: seconds, [frames].
-        begin: seconds, when it begins to rise.
-        rise, hold, fall: seconds that each takes.
+        begin: seconds, start of the rise.
+        rise, hold, fall: durations in seconds.
     """
     up = smooth_step((times - begin) / rise)
     return np.minimum(up, smooth_step((begin + rise + hold + fall - times) / fall))
 
 
 def blink_times(phonemes: Sequence[Phoneme], duration: float, seed: int) -> list[float]:
-    """When lids begin to fall: at a natural rate, and where speech pauses if it does so near.
+    """The times at which lids begin to fall: at a natural rate, moved to near pauses of speech.
 
     Args:
-        phonemes: of the voice; pauses are SIL.
-        duration: of the voice, seconds.
-        seed: the same one gives the same times.
+        phonemes: phonemes of the voice; pauses are SIL.
+        duration: duration of the voice, seconds.
+        seed: the same seed gives the same times.
 
     Returns:
         Seconds, ascending.
@@ -75,12 +75,12 @@ def blinks(times: Times, begins: Sequence[float]) -> dict[str, Curves]:
 
 
 def accent_curves(times: Times, found: Sequence[Accent], intensity: float) -> dict[str, Curves]:
-    """Brows that rise and a head that nods with what is stressed: float64[frames] by control.
+    """Brows and nods that follow stressed syllables: float64[frames] by control.
 
     Args:
         times: seconds, [frames].
-        found: what is stressed.
-        intensity: 1 as usual; 0 nothing moves.
+        found: the stressed syllables.
+        intensity: 1 is usual; 0 moves nothing.
     """
     brows, nod = np.zeros(len(times)), np.zeros(len(times))
     for accent in found:

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""A pronunciation for words that no dictionary has: letter-to-sound rules for English.
+"""Pronunciation of words that no dictionary has: letter-to-sound rules for English.
 
-They need not be right as speech, only as movement of the mouth: an aligner that knows roughly
-what comes finds when it comes.
+They need not be correct as speech, only as mouth movement: with an approximate pronunciation the
+aligner still finds the times.
 """
 
 from __future__ import annotations
 
-# Letters -> phonemes, longest first. ^ stands for the begin of the word and $ for its end.
+# Letters -> phonemes, longest first. ^ is the begin of the word and $ its end.
 _RULES = {
     "tion": "SH AH N", "sion": "ZH AH N", "ough": "AO", "augh": "AO", "eigh": "EY", "tch": "CH",
     "igh": "AY", "sch": "S K", "dge": "JH", "eau": "OW", "air": "EH R", "ear": "IH R",
@@ -38,13 +38,13 @@ _LONGEST = 5
 
 
 def pronounce(word: str) -> list[str]:
-    """Phonemes of a word.
+    """The phonemes of a word.
 
     Args:
         word: letters a to z and apostrophes, at least one letter.
     """
     letters = word.replace("'", "")
-    if not _VOWELS & set(letters):  # an abbreviation: its letters are named
+    if not _VOWELS & set(letters):  # an abbreviation: spell its letters
         return " ".join(_NAMES[letter] for letter in letters).split()
     said: list[str] = []
     place = 0
@@ -60,7 +60,7 @@ def pronounce(word: str) -> list[str]:
 
 
 def _is_long(letters: str, place: int) -> bool:
-    """A vowel made long by a silent e at the end of the word, as in take."""
+    """Whether a silent e at the end of the word makes the vowel long, as in take."""
     tail = letters[place:]
     return (
         len(tail) == 3
@@ -72,7 +72,7 @@ def _is_long(letters: str, place: int) -> bool:
 
 
 def _rule(letters: str, place: int) -> tuple[int, str]:
-    """How many letters the longest rule that fits takes, and their phonemes."""
+    """The number of letters of the longest matching rule, and their phonemes."""
     for length in range(min(_LONGEST, len(letters) - place), 0, -1):
         part = letters[place : place + length]
         begin = "^" if place == 0 else ""

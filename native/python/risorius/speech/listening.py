@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A voice of any length as phonemes: cut at silences, aligned or recognised piece by piece."""
+"""A voice of any length as phonemes: cut at silences, and aligned or recognised in pieces."""
 
 from __future__ import annotations
 
@@ -22,37 +22,37 @@ Cancel = Callable[[], bool]
 STEP = 0.01
 """Seconds between two values of a loudness curve."""
 
-_PIECE = 12.0  # seconds that a piece has at least, if silences allow it
-_LONGEST_PIECE = 30.0  # a decoder's memory grows with it
-_PAUSE = 0.15  # seconds of silence that one may cut in
+_PIECE = 12.0  # least length of a piece in seconds, if silences allow it
+_LONGEST_PIECE = 30.0  # limits the memory of the decoder
+_PAUSE = 0.15  # seconds of silence in which a cut is allowed
 _SHORTEST_SILENCE = 0.08  # seconds
 _SHORTEST_PHONEME = 0.03
 _DOUBTFUL = 0.37  # confidence; of right transcripts 0.41 to 0.77, of wrong ones up to 0.35
 _UNSAID = 0.2  # of the loud time
-_LEAST_FOUND = 0.6  # of a transcript's words: of others' transcripts up to half are "found"
-_SILENT = -80.0  # decibels below full scale: nothing quieter is speech
-_GAP = 0.05  # seconds between words that do not follow each other
+_LEAST_FOUND = 0.6  # of a transcript's words; up to half are found even for a wrong transcript
+_SILENT = -80.0  # decibels below full scale: quieter sound is not speech
+_GAP = 0.05  # seconds between words that are not adjacent
 _NO_SPEECH = "no speech was heard"
 _STOPS = frozenset({"P", "B", "T", "D", "K", "G", "CH", "JH"})
 
 
 class CancelledError(RisoriusError):
-    """The caller's cancel() said so."""
+    """The caller's cancel() returned true."""
 
     code = "cancelled"
 
 
 class Heard(NamedTuple):
-    """What listening gave."""
+    """The result of listening."""
 
     phonemes: list[Phoneme]
     """In order, without gaps from 0 to the end of the sound; pauses are SIL."""
     samples: Samples
     """float32[n] at audio.RATE."""
     aligned: bool
-    """Whether the phonemes are those of the transcript."""
+    """Whether the phonemes come from the transcript."""
     notes: list[str]
-    """Sentences for whoever reads the result: what went otherwise than asked."""
+    """Sentences about deviations from the request."""
 
 
 def listen(
@@ -65,14 +65,14 @@ def listen(
     """The phonemes of a sound file.
 
     Args:
-        path: as audio.read_audio takes it.
-        transcript: what is said in it, in English, if that is known.
-        progress: called with 0 to 1 now and then.
-        cancel: asked now and then; true ends the work.
+        path: as in audio.read_audio.
+        transcript: the spoken words in English, if known.
+        progress: called with 0 to 1 from time to time.
+        cancel: called from time to time; true ends the work.
 
     Raises:
-        AudioError: the file cannot be used. ValueError: a transcript without English words, or
-            PocketSphinx is not installed. CancelledError: cancel() was true.
+        AudioError: an unusable file. ValueError: a transcript without English words, or
+            PocketSphinx is not installed. CancelledError: cancel() returned true.
     """
     words = None if transcript is None else text.words(transcript)
     if words is not None and not words:
@@ -105,14 +105,14 @@ def listen(
 
 
 def follow(path: str | os.PathLike[str], found: Sequence[Phoneme]) -> Heard:
-    """A sound file whose phonemes are known already; nobody listens, PocketSphinx is not needed.
+    """A sound file with known phonemes; PocketSphinx is not needed.
 
     Args:
-        path: as audio.read_audio takes it.
-        found: in order; what lies between them is silence.
+        path: as in audio.read_audio.
+        found: in order; gaps are silence.
 
     Raises:
-        AudioError: the file cannot be used. ArgumentError: a phoneme begins after the sound's end.
+        AudioError: an unusable file. ArgumentError: a phoneme begins after the sound's end.
     """
     samples = resample(*read_audio(path))
     duration = len(samples) / RATE
@@ -139,7 +139,7 @@ def _reporter(progress: Progress | None, cancel: Cancel | None) -> Progress:
 def _aligned(
     recogniser: Recogniser, samples: Samples, words: Sequence[str], tell: Progress, notes: list[str]
 ) -> list[Phoneme] | None:
-    """The transcript's phonemes at their times, or None if too little of it fits."""
+    """The transcript's phonemes with times, or None if too little of it fits."""
     duration = len(samples) / RATE
     segments = recogniser.align_words(samples, words)
     if segments is not None:
@@ -161,7 +161,7 @@ def _aligned(
 def _piece(
     recogniser: Recogniser, samples: Samples, begin: float, end: float, said: Sequence[str]
 ) -> list[Phoneme]:
-    """The phonemes of a piece: of the words, or what is heard where there are none."""
+    """The phonemes of a piece: of its words, or the recognised ones if it has none."""
     piece = samples[int(begin * RATE) : int(end * RATE)]
     phones = recogniser.align_phonemes(piece, said) if said else None
     if phones is not None:
@@ -170,14 +170,14 @@ def _piece(
 
 
 def _shifted(found: Sequence[Phoneme], begin: float, end: float) -> list[Phoneme]:
-    """A piece's phonemes on the clock of the whole."""
+    """A piece's phonemes with times of the whole sound."""
     return [p._replace(begin=p.begin + begin, end=min(p.end + begin, end)) for p in found]
 
 
 def _loose_pieces(
     segments: Sequence[Segment], duration: float
 ) -> list[tuple[float, float, list[str]]]:
-    """Begin, end and words of each piece: words that follow each other, and the gaps between."""
+    """Begin, end and words of each piece: adjacent words, and the gaps between them."""
     parts: list[tuple[float, float, list[str]]] = []
     for segment in segments:
         last = parts[-1][1] if parts else 0.0
@@ -193,14 +193,14 @@ def _loose_pieces(
 
 
 def confidence(found: Sequence[Phoneme]) -> float:
-    """The mean over the time of all phonemes but silence; 0 if there are none."""
+    """The mean confidence of all phonemes except silence, weighted by time; 0 if there are none."""
     spoken = [p for p in found if p.name != "SIL"]
     whole = sum(p.end - p.begin for p in spoken)
     return sum(p.confidence * (p.end - p.begin) for p in spoken) / whole if whole else 0.0
 
 
 def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[str]:
-    """What makes one doubt that the transcript is this voice's, as sentences."""
+    """Sentences about signs that the transcript does not belong to this voice."""
     notes = []
     if confidence(found) < _DOUBTFUL:
         notes.append("the transcript fits the voice badly: is it of another recording?")
@@ -219,7 +219,7 @@ def _doubts(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[s
 def _word_pieces(
     segments: Sequence[Segment], duration: float
 ) -> Iterator[tuple[float, float, list[str]]]:
-    """Begin, end and words of each piece: cut in pauses, the whole time covered."""
+    """Begin, end and words of each piece; pieces are cut in pauses and cover the whole time."""
     begin = 0.0
     said: list[str] = []
     for segment in segments:
@@ -249,7 +249,8 @@ def _recognised(recogniser: Recogniser, samples: Samples, tell: Progress) -> lis
 
 
 def loudness(samples: Samples) -> npt.NDArray[np.float64]:
-    """Decibels below full scale every STEP seconds, in windows of 25 ms; at least -100."""
+    """Loudness in decibels relative to full scale every STEP seconds, in windows of 25 ms; at least
+    -100."""
     hop = int(STEP * RATE)
     count = max(1, -(-len(samples) // hop))
     half = int(0.0125 * RATE)
@@ -262,13 +263,13 @@ def loudness(samples: Samples) -> npt.NDArray[np.float64]:
 
 
 def speaking(levels: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
-    """Where the sound is loud enough to be speech: [levels]."""
+    """Whether the sound is loud enough to be speech: [levels]."""
     floor, peak = float(np.quantile(levels, 0.05)), float(np.quantile(levels, 0.98))
     return levels > max(_SILENT, peak - 38.0, min(floor + 8.0, peak - 12.0))
 
 
 def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
-    """Begin and end in seconds of the pieces to decode on their own; together the whole sound."""
+    """Begin and end in seconds of pieces to decode separately; they cover the whole sound."""
     quiet = ~speaking(levels)
     shortest, longest = int(_PIECE / STEP), int(_LONGEST_PIECE / STEP)
     cuts = [0]
@@ -276,7 +277,8 @@ def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
     pauses = [(int(a), int(b)) for a, b in edges.reshape(-1, 2) if b - a >= _PAUSE / STEP]
     for first, last in [*pauses, (len(levels), len(levels))]:
         middle = (first + last) // 2
-        while middle - cuts[-1] > longest:  # no pause for too long: at the quietest moment
+        # Without a pause for too long: cut at the quietest moment.
+        while middle - cuts[-1] > longest:
             window = levels[cuts[-1] + shortest : cuts[-1] + longest]
             cuts.append(cuts[-1] + shortest + int(np.argmin(window)))
         if middle - cuts[-1] >= shortest and len(levels) - middle >= shortest // 4:
@@ -286,9 +288,9 @@ def pieces(levels: npt.NDArray[np.float64]) -> list[tuple[float, float]]:
 
 
 def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> list[Phoneme]:
-    """The phonemes without the pauses that a decoder counted to one of them.
+    """The phonemes without pauses that a decoder included in them.
 
-    Silence within a word is the closure of a stop, and stays it. A phoneme keeps 30 ms at least.
+    Silence within a word is the closure of a stop and stays. A phoneme keeps at least 30 ms.
 
     Args:
         found: phonemes of a piece, in order.
@@ -318,17 +320,17 @@ def with_silences(found: Sequence[Phoneme], levels: npt.NDArray[np.float64]) -> 
 
 
 def _is_closure(phones: Sequence[Phoneme], last: int, begin: float) -> bool:
-    """Whether a silence from `begin` on leads into the middle of a word."""
+    """Whether a silence from `begin` on is the closure of a stop inside a word."""
     phone = phones[last]
     return phone.name in _STOPS and not phone.word and phone.begin > begin - 0.05
 
 
 def filled(found: Sequence[Phoneme], duration: float) -> list[Phoneme]:
-    """The phonemes of a whole sound: silence where nothing is said, neighbours of silence joined.
+    """The phonemes of a whole sound: gaps become silence, adjacent silences are joined.
 
     Args:
         found: in order.
-        duration: of the sound, seconds.
+        duration: duration of the sound, seconds.
     """
     whole: list[Phoneme] = []
     place = 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Phonemes, and the viseme class that each one looks like."""
+"""Phonemes, and the viseme class of each."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class Phoneme(NamedTuple):
     name: str
     """As in the CMU dictionary, without stress: AA, B, ... ZH; SIL for silence."""
     confidence: float = 1.0
-    """0 to 1: the share of its time in which a second decoder, that knows of phonemes only, hears
-    the same viseme."""
+    """0 to 1: share of its time in which a second decoder, which knows only phonemes, hears the
+    same viseme."""
     word: str = ""
-    """The word that begins with it, where words are known; it ends before the next word or SIL."""
+    """The word that begins with it, if words are known; it ends before the next word or SIL."""
 
 
-# A diphthong is listed with its nucleus; GLIDES says where it goes.
+# A diphthong is listed by its nucleus; GLIDES has its end.
 _CLASSES = {
     "sil": "SIL", "PP": "P B M", "FF": "F V", "TH": "TH DH", "DD": "T D", "kk": "K G NG HH",
     "CH": "CH JH SH ZH", "SS": "S Z", "nn": "N L", "RR": "R ER", "aa": "AA AE AH AY AW",
@@ -39,28 +39,28 @@ CLASS_OF = {phone: viseme for viseme, phones in _CLASSES.items() for phone in ph
 
 GLIDES = {"AY": ("aa", "I"), "AW": ("aa", "U"), "EY": ("E", "I"), "OW": ("O", "U"),
           "OY": ("O", "I")}  # fmt: skip
-"""Diphthong -> the viseme it begins with and the one it ends with."""
+"""Diphthong -> its first and its last viseme."""
 
 
 def viseme_of(phone: str) -> str:
-    """The class of a phoneme; noises and whatever else is not speech look like silence."""
+    """The class of a phoneme; noises and other sounds look like silence."""
     return CLASS_OF.get(phone, "sil")
 
 
 def label_of(phone: str) -> str:
-    """What animators call the mouth of a phoneme: M B P, F V, Oo."""
+    """The animators' name for the mouth of a phoneme: M B P, F V, Oo."""
     return get(viseme_of(phone)).label
 
 
 def phone_named(text: str) -> str | None:
-    """The phoneme that a person or another program means, or None.
+    """The phoneme that a typed or imported name means, or None.
 
     Args:
-        text: a phoneme of the CMU dictionary (AH, also AH0), a mouth as animators call it (M B P),
-            its viseme (PP), or nothing, sil, sp or spn for silence; capitals do not matter.
+        text: a phoneme of the CMU dictionary (AH, also AH0), an animators' name of a mouth (M B P),
+            its viseme (PP), or empty, sil, sp or spn for silence; case does not matter.
 
     Returns:
-        The phoneme; of a mouth the first that looks so.
+        The phoneme; for a mouth the first phoneme that has it.
     """
     said = " ".join(text.split())
     phone = said.upper().rstrip("012") if said[:-1].isalpha() else said.upper()

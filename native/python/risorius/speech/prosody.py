@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a voice says it: pitch, loudness, and the syllables that stand out."""
+"""Prosody of a voice: pitch, loudness, and stressed syllables."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .phones import VOWEL_VISEMES, Phoneme, viseme_of
 Curve = npt.NDArray[np.float64]
 
 OPENNESS_STEP = 0.04
-"""Seconds between two values of `openness`: a quarter of the time over which it is smooth."""
+"""Seconds between two values of `openness`: a quarter of its smoothing time."""
 
-_PITCH_RATE = 8000  # samples a second: enough for a fundamental
+_PITCH_RATE = 8000  # samples per second: enough for a fundamental
 _LOWEST, _HIGHEST = 60.0, 400.0  # Hz
-_VOICED = 0.45  # of the power repeats after a period
+_VOICED = 0.45  # share of the power that repeats after a period
 
 
 class Accent(NamedTuple):
-    """A syllable that stands out."""
+    """A stressed syllable."""
 
     time: float
     """Seconds, the middle of its vowel."""
@@ -33,9 +33,9 @@ class Accent(NamedTuple):
 
 
 def pitch(samples: Samples) -> Curve:
-    """Semitones above 100 Hz every STEP seconds; NaN where no voice sounds.
+    """Semitones above 100 Hz every STEP seconds; NaN where the sound is unvoiced.
 
-    By the autocorrelation of windows of 40 ms, divided by that of the window (Boersma 1993).
+    Uses the autocorrelation of windows of 40 ms, divided by that of the window (Boersma 1993).
     """
     low = resample(samples, RATE, _PITCH_RATE)
     width, hop = int(0.04 * _PITCH_RATE), int(STEP * _PITCH_RATE)
@@ -53,7 +53,7 @@ def pitch(samples: Samples) -> Curve:
         block = (block - block.mean(axis=1, keepdims=True)) * shape
         power = np.fft.irfft(np.square(np.abs(np.fft.rfft(block, size))))
         score = power[:, lags] / np.maximum(power[:, :1], 1e-9) * (own[0] / own[lags])
-        best = np.argmax(score - 0.002 * lags, axis=1)  # the first of equal peaks is the period
+        best = np.argmax(score - 0.002 * lags, axis=1)  # of equal peaks the first is the period
         voiced = (score[np.arange(len(block)), best] > _VOICED) & (power[:, 0] > 1e-6)
         heights = 12.0 * np.log2(_PITCH_RATE / lags[best] / 100.0)
         found[first : first + len(block)] = np.where(voiced, heights, np.nan)
@@ -61,14 +61,14 @@ def pitch(samples: Samples) -> Curve:
 
 
 def openness(samples: Samples) -> Curve:
-    """How far vowels open, from loudness: about 0.6 to 1.25 every OPENNESS_STEP, without jitter.
+    """The opening of vowels from loudness: about 0.6 to 1.25 every OPENNESS_STEP, without jitter.
 
     Args:
-        samples: of the voice, at RATE.
+        samples: samples of the voice, at RATE.
 
     Returns:
-        float64[n] in whole thousandths, so that text holds them as they are; the first is the
-        value half a STEP after the begin.
+        float64[n] in whole thousandths, so that text stores them exactly; the first value belongs
+        to half a STEP after the beginning.
     """
     levels = loudness(samples)
     loud = levels[speaking(levels)]
@@ -81,10 +81,10 @@ def openness(samples: Samples) -> Curve:
 
 
 def openness_at(opened: Curve, times: Curve) -> Curve:
-    """What `openness` gave, at any times.
+    """The values of `openness` at any times.
 
     Args:
-        opened: of `openness`.
+        opened: from `openness`.
         times: seconds, [frames].
     """
     return np.interp(times, np.arange(len(opened)) * OPENNESS_STEP + 0.5 * STEP, opened)
@@ -94,9 +94,9 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
     """The vowels that are louder, higher or longer than those around.
 
     Args:
-        phonemes: of the voice, in order.
-        samples: of the voice, at RATE.
-        apart: seconds that lie between two of them at least.
+        phonemes: phonemes of the voice, in order.
+        samples: samples of the voice, at RATE.
+        apart: least number of seconds between two accents.
     """
     levels, heights = loudness(samples), pitch(samples)
     vowels = [p for p in phonemes if viseme_of(p.name) in VOWEL_VISEMES | {"RR"}]

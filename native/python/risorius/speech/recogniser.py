@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Phonemes with their times: a known text aligned to a voice, or what is heard in it.
+"""Timed phonemes: a known text aligned to a voice, or recognised speech.
 
-The decoders are PocketSphinx's with the English model of its wheel. It counts in frames of 10 ms.
+The decoders are PocketSphinx's with the English model of its wheel. Frames have 10 ms.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ FRAME = 0.01
 _NEEDS = (
     "speech is recognised by PocketSphinx, which is not installed: pip install risorius[speech]"
 )
-_PAD = 0.3  # of near silence around each piece: a decoder wants to hear where speech begins
-_LAG = 0.0128  # seconds from the begin of a frame to the middle of the 25.6 ms that it hears
-_SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01  # likelihoods within a transcript that may be wrong
+# Seconds of near silence around each piece, because a decoder needs to hear the start of speech.
+_PAD = 0.3
+_LAG = 0.0128  # seconds from the begin of a frame to the middle of its 25.6 ms window
+_SAID, _SKIPPED, _OTHER = 0.98, 0.002, 0.01  # likelihoods in a transcript that may be wrong
 _PHONE_OPTIONS: dict[str, Any] = {"beam": 1e-20, "pbeam": 1e-20, "lw": 1.0}
-# One pass with narrow beams: three quick hearings together are better than a thorough one.
+# One pass with narrow beams: three quick decodings together are better than a thorough one.
 _WORD_OPTIONS: dict[str, Any] = {"fwdflat": False, "maxhmmpf": 3000, "beam": 1e-40, "wbeam": 1e-20}
-# Tried in turn: on the best path through the lattice of words the alignment of the phonemes
+# Tried in turn, because on the best path through the lattice of words the alignment of phonemes
 # sometimes does not reach the end of the sound.
 _ALIGNERS: dict[str, dict[str, Any]] = {
     "narrow": {},
@@ -39,7 +40,7 @@ _ALIGNERS: dict[str, dict[str, Any]] = {
 
 
 class MissingError(RisoriusError):
-    """PocketSphinx is not installed; the sentence says how to get it."""
+    """PocketSphinx is not installed; the sentence says how to install it."""
 
     code = "missing_package"
 
@@ -51,11 +52,12 @@ class Segment(NamedTuple):
     end: float
     name: str
     word: str
-    """The word, of a phoneme the word that begins with it; "" of anything else."""
+    """The word; for a phoneme the word that begins with it; otherwise ""."""
 
 
 class Recogniser:
-    """Decoders, each made when it is first needed (the language model takes a second to load)."""
+    """The decoders; each is made on first use, because the language model takes a second to
+    load."""
 
     def __init__(self) -> None:
         """Raises: MissingError."""
@@ -78,11 +80,11 @@ class Recogniser:
         return self._decoders[kind]
 
     def align_words(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        """The words at their times, silences in between; None if the voice does not say them.
+        """The words with times, with silences between; None if the voice does not say them.
 
         Args:
-            samples: of a piece of a voice, at RATE.
-            words: in the order in which they are said.
+            samples: samples of a piece of a voice, at RATE.
+            words: in the spoken order.
         """
         for kind in _ALIGNERS:
             found = self._word_pass(kind, samples, words)
@@ -91,11 +93,11 @@ class Recogniser:
         return None
 
     def align_phonemes(self, samples: Samples, words: Sequence[str]) -> list[Segment] | None:
-        """The phonemes of the words at their times; None if the voice does not say them.
+        """The phonemes of the words with times; None if the voice does not say them.
 
         Args:
-            samples: of a piece of a voice, at RATE.
-            words: in the order in which they are said.
+            samples: samples of a piece of a voice, at RATE.
+            words: in the spoken order.
         """
         for kind in _ALIGNERS:
             if self._word_pass(kind, samples, words) is not None:
@@ -105,14 +107,13 @@ class Recogniser:
         return None
 
     def align_loosely(self, samples: Samples, words: Sequence[str]) -> list[Segment]:
-        """Those of the words that are said, at their times; the rest of the voice is left out.
+        """The spoken ones of these words, with times; other speech is left out.
 
-        For a transcript that is not to the letter: each word may be skipped, and noise of speech
-        may come before any.
+        For an inexact transcript: each word may be skipped, and other speech may precede any word.
 
         Args:
-            samples: of a piece of a voice, at RATE.
-            words: in the order in which they are said.
+            samples: samples of a piece of a voice, at RATE.
+            words: in the spoken order.
         """
         decoder = self._decoder("one way")
         self._learn(decoder, words)
@@ -138,7 +139,7 @@ class Recogniser:
         return found if [s.word for s in found if s.word] == list(words) else None
 
     def hear_words(self, samples: Samples) -> list[Segment] | None:
-        """The phonemes of the words that a language model of English finds likeliest."""
+        """The phonemes of the words that an English language model finds most likely."""
         decoder = self._decoder("words")
         decoder.activate_search()
         _decode(decoder, _pcm(samples))
@@ -149,16 +150,16 @@ class Recogniser:
         return _phone_pass(decoder, samples) or self.align_phonemes(samples, words)
 
     def hear_phonemes(self, samples: Samples) -> list[Segment]:
-        """The likeliest phonemes, without a thought of words."""
+        """The most likely phonemes, independent of words."""
         decoder = self._decoder("phones")
         _decode(decoder, _pcm(samples))
         return [s._replace(name=_phone(s.name), word="") for s in _segments(decoder, len(samples))]
 
 
 def _pcm(samples: Samples) -> bytes:
-    """16 bit samples between pads, as loud as the model is used to.
+    """16-bit samples between pads, at the loudness that the model expects.
 
-    A little noise, always the same, covers silence that is exactly 0: its logarithm is no feature.
+    A little constant noise covers exact silence, whose logarithm is undefined.
     """
     pad = np.zeros(int(_PAD * RATE), np.float32)
     loud = float(np.quantile(np.abs(samples), 0.99)) if len(samples) else 0.0
@@ -174,7 +175,7 @@ def _decode(decoder: Any, pcm: bytes) -> None:
 
 
 def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
-    """The second pass: where the phonemes are within the words that the first one found."""
+    """The second pass: the times of phonemes within the words of the first pass."""
     try:
         decoder.set_alignment()
         _decode(decoder, _pcm(samples))
@@ -200,23 +201,23 @@ def _segments(decoder: Any, count: int) -> list[Segment]:
 
 
 def _segment(first: int, last: int, name: str, word: str, count: int) -> Segment:
-    """Frames of padded sound as seconds of the sound itself."""
+    """Converts frames of the padded sound to seconds of the sound."""
     begin, end = (min(max(n * FRAME - _PAD + _LAG, 0.0), count / RATE) for n in (first, last))
     spoken = "" if word[:1] in "<[+" or word == "SIL" else word.partition("(")[0]
     return Segment(begin, end, name, spoken)
 
 
 def _phone(name: str) -> str:
-    """Without the mark of a noise: +SPN+ and its like are silence to the mouth."""
+    """Without the mark of a noise: +SPN+ and similar are silence for the mouth."""
     return "SIL" if name.startswith("+") or name.startswith("<") else name
 
 
 def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[float]:
-    """Of each segment the share of its time in which the other decoder hears the same viseme.
+    """For each segment, the share of its time in which the other decoder hears the same viseme.
 
     Args:
         segments: phonemes of one decoder.
-        other: phonemes of the other, on the same clock.
+        other: phonemes of the other decoder, with times on the same clock.
 
     Returns:
         Numbers from 0 to 1.
@@ -235,12 +236,12 @@ def agreement(segments: Sequence[Segment], other: Sequence[Segment]) -> list[flo
 def to_phonemes(
     segments: Sequence[Segment], shares: Sequence[float], offset: float
 ) -> list[Phoneme]:
-    """Phonemes of a piece of a voice on the clock of the whole; those without a duration left out.
+    """Phonemes of a piece with times of the whole sound; those without a duration are left out.
 
     Args:
         segments: phonemes of the piece.
-        shares: certainty of each, from 0 to 1.
-        offset: seconds, when the piece begins.
+        shares: confidence of each, from 0 to 1.
+        offset: seconds, begin of the piece.
     """
     return [
         Phoneme(s.begin + offset, s.end + offset, s.name, round(share, 3), s.word)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Phonemes and words with their times as files that people and other programs correct.
+"""Files of timed phonemes and words that people and other programs correct.
 
-Two forms: lines with tabs, and Praat's TextGrid with a tier of words and one of phones, as Praat,
-ELAN and forced aligners (MFA) write it.
+Two forms: tab-separated lines, and Praat's TextGrid with a tier of words and one of phones, as
+written by Praat, ELAN and forced aligners (MFA).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..base.errors import RisoriusError
 from .phones import Phoneme, phone_named
 
-_TOUCH = 0.005  # seconds by which neighbours in a file may overlap: rounding
+_TOUCH = 0.005  # seconds by which neighbours in a file may overlap, for rounding
 _COLUMNS = ("begin", "end", "phoneme")
 _TOKEN = re.compile(
     r'"((?:[^"]|"")*)"|<(\w+)>|(?<!\S)([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?!\S)|![^\n]*'
@@ -24,7 +24,7 @@ _EXPECTED = "a phoneme such as AA, a mouth such as M B P, or sil"
 
 
 class SheetError(RisoriusError):
-    """A file of phonemes that cannot be used; one sentence with the place."""
+    """An unusable file of phonemes; one sentence with the place."""
 
     code = "phoneme_file"
 
@@ -41,11 +41,11 @@ def suits_textgrid(name: str) -> bool:
 
 
 def write(found: Sequence[Phoneme], name: str) -> str:
-    """The text of a file of phonemes: a TextGrid by its suffix, else lines with tabs.
+    """The text of a file of phonemes: a TextGrid by its suffix, else tab-separated lines.
 
     Args:
         found: in order, without gaps.
-        name: of the file.
+        name: name of the file.
     """
     return textgrid(found) if suits_textgrid(name) else table(found)
 
@@ -58,7 +58,7 @@ def table(found: Sequence[Phoneme]) -> str:
 
 
 def words_of(found: Sequence[Phoneme]) -> list[tuple[float, float, str]]:
-    """Begin, end and text of each word: it ends before the next one and before silence."""
+    """Begin, end and text of each word; it ends before the next word and before silence."""
     words: list[tuple[float, float, str]] = []
     open_ = False
     for phone in found:
@@ -96,14 +96,14 @@ def textgrid(found: Sequence[Phoneme]) -> str:
 
 
 def read(data: bytes, name: str) -> list[Phoneme]:
-    """The phonemes of a file, of either form; in order, what lies between them is silence.
+    """The phonemes of a file in either form, in order; gaps are silence.
 
     Args:
-        data: of the file, UTF-8 or UTF-16 with its mark.
-        name: what errors call the file.
+        data: content of the file, UTF-8, or UTF-16 with its byte order mark.
+        name: the file's name in errors.
 
     Raises:
-        SheetError: another form, times that do not ascend, a phoneme that nobody knows.
+        SheetError: another form, times that do not ascend, an unknown phoneme.
     """
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     try:
@@ -186,8 +186,8 @@ def _from_textgrid(text: str, name: str) -> list[Phoneme]:
 
 
 def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
-    """The tiers of intervals by their names. Praat reads numbers, strings and flags that stand
-    free, and nothing else; so long and short files are the same."""
+    """The tiers of intervals by name. Praat reads only numbers, strings and flags that stand free,
+    so that long and short files are equal."""
     tokens = _Tokens(text, name)
     tokens.string()  # ooTextFile
     tokens.string()  # TextGrid
@@ -212,7 +212,7 @@ def _tiers(text: str, name: str) -> dict[str, list[_Interval]]:
 
 
 class _Tokens:
-    """What stands free in a file of Praat's, one after the other."""
+    """The free-standing numbers, strings and flags in a file of Praat, one after the other."""
 
     def __init__(self, text: str, name: str) -> None:
         self._found = _TOKEN.finditer(text)

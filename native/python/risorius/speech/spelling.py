@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The phonemes of written words: from PocketSphinx's dictionary, else by rule."""
+"""The phonemes of written words: from PocketSphinx's dictionary, else by rules."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ _DICTIONARY = ("model", "en-us", "cmudict-en-us.dict")
 
 
 def spell(said: str, places: Sequence[str] | None = None) -> list[tuple[str, list[str]]]:
-    """How written words are pronounced.
+    """The pronunciation of written words.
 
     Args:
-        said: words, numbers and signs, in English.
-        places: folders in which PocketSphinx may be installed; None: where Python looks. It is
-            read as a file and not imported. Without it words are pronounced by rule.
+        said: English words, numbers and signs.
+        places: folders in which PocketSphinx may be installed; None: Python's search path. Its
+            dictionary is read as a file, without importing the package. Without it rules are used.
 
     Returns:
-        Each spoken word, in lower case, with its phonemes, at least one.
+        Each spoken word in lower case with its phonemes; at least one word.
 
     Raises:
-        ArgumentError: there is no English word in it.
+        ArgumentError: there is no English word.
     """
     words = text.words(said)
     if not words:
@@ -39,7 +39,7 @@ def spell(said: str, places: Sequence[str] | None = None) -> list[tuple[str, lis
 
 
 def _looked_up(words: set[str], places: Sequence[str]) -> dict[str, list[str]]:
-    """The first pronunciation of each word that the dictionary has."""
+    """The first pronunciation of each word in the dictionary."""
     path = _dictionary(places)
     if path is None:
         return {}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A transcript as the words that were said: numbers and signs spelled out."""
+"""A transcript as spoken words: numbers and signs are spelled out."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _TOKEN = re.compile(
 def words(transcript: str) -> list[str]:
     """The words of a text in lower case: letters and apostrophes only.
 
-    What stands in brackets, as in (laughs) or [music], was not said and is left out.
+    Text in brackets, such as (laughs) or [music], was not spoken and is left out.
     """
     text = re.sub(r"\[[^\]]*\]|\([^)]*\)|<[^>]*>", " ", transcript)
     text = unicodedata.normalize("NFKD", text.replace("\u2019", "'").replace("°", _SIGNS["°"]))
@@ -48,7 +48,7 @@ def _spoken(match: re.Match[str]) -> list[str]:
         word = match[0].strip("'")
         return [word] if word else []
     plain = (number or stuck).replace(",", "")
-    if len(plain) > 30:  # nobody says it as a number
+    if len(plain) > 30:  # too long to be said as a number
         return [_SMALL[int(digit)] for digit in plain if digit.isdigit()]
     if currency:
         return _money(plain, *_MONEY[currency])
@@ -62,7 +62,7 @@ def _spoken(match: re.Match[str]) -> list[str]:
 
 
 def cardinal(number: int) -> list[str]:
-    """A whole number in words; digit by digit from a thousand billions on."""
+    """A whole number in words; digit by digit from 10^12 on."""
     if number >= 10**12:
         return [_SMALL[int(digit)] for digit in str(number)]
     for size, name in _LARGE:
@@ -75,7 +75,7 @@ def cardinal(number: int) -> list[str]:
 
 
 def _year(digits: str) -> list[str]:
-    """Four digits as one says a year (nineteen eighty four), others as a number."""
+    """Four digits as a year (nineteen eighty four), others as a number."""
     if digits.startswith("0") and len(digits) > 1:
         return [_SMALL[int(digit)] for digit in digits]
     number = int(digits)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Eyes that are alive: balls with an iris of depth, a cornea, lids that lie on them, tears."""
+"""Eyes: balls with a deep iris, corneas, lids that lie on the balls, tears."""
 
 from .eyeball import with_eyeballs
 from .parts import eye_parts

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Eyeballs that the data do not have: a ball, an iris behind it as a dish with a hole, a cornea.
+"""Eyeballs, which the data do not have: a ball with a dished iris behind it, and a cornea.
 
-Both are surfaces of revolution about the gaze. Their vertices follow those of the base mesh, so
-that all that is known by vertex (positions, motions, skin weights) is known of them too.
+Both are surfaces of revolution about the gaze. Their vertices follow the vertices of the base mesh,
+so that positions, motions and skin weights by vertex cover them too.
 """
 
 from __future__ import annotations
@@ -17,34 +17,36 @@ from ..source import BaseMesh
 
 MM = 0.01  # the data are in decimetres
 SEGMENTS = 48
-# Of the ball's radius: people have 5.85 mm in 12, but the lids of the data fit a larger ball.
+# In radii of the ball. People have 5.85 mm in 12 mm, but the lids of the data fit a larger ball.
 IRIS = 0.395
-CORNEA = 4 / 3  # radius of the cornea over that of the iris: 7.8 mm over 5.85
-PUPIL = 0.33  # of the iris, in a room's light
-CONVERGENCE = 1.2  # degrees inwards: at somebody a metre and a half away
-_LIMBUS = float(np.arcsin(IRIS))  # radians from the gaze, seen from the ball's middle
-_EDGE = _LIMBUS + 0.22  # where the cornea's shell has sunk into the ball
-_SOFT = 0.012  # of the ball's radius: over what cornea and ball run into each other
-_CLEAR = 0.0015  # of the ball's radius: the shell lies above the ball
-# The iris from the pupil (0) to its root (1), and how deep it is behind the limbus, in its radii.
+CORNEA = 4 / 3  # radius of the cornea / radius of the iris: 7.8 mm / 5.85 mm
+PUPIL = 0.33  # radius of the pupil in radii of the iris, in room light
+CONVERGENCE = 1.2  # degrees inwards: both eyes look at a point 1.5 m away
+# angle of the limbus from the gaze, radians, at the ball's middle.
+_LIMBUS = float(np.arcsin(IRIS))
+_EDGE = _LIMBUS + 0.22  # angle where the cornea's shell sinks into the ball
+_SOFT = 0.012  # width of the blend between cornea and ball, in radii of the ball
+_CLEAR = 0.0015  # gap between shell and ball, in radii of the ball
+# Rings of the iris from the pupil (0) to its root (1), and their depth behind the limbus, in
+# radii of the iris.
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
-_HOLE = 0.28  # how deep the pupil is, in radii of the iris
+_HOLE = 0.28  # depth of the pupil, in radii of the iris
 _BEHIND = np.array(
     [0.02, 0.06, 0.11, 0.17, 0.25, 0.35, 0.47, 0.60, 0.75, 0.92, 1.12, 1.4, 1.8, 2.25]
 )
 _CORNEA_RINGS = np.array(
     [0.06, 0.14, 0.24, 0.34, 0.44, 0.53, 0.61, 0.68, 0.75, 0.82, 0.89, 0.95, 1.0]
 )
-# What the coarse level keeps of the rings: the others are near these.
+# Rings that the coarse LOD keeps; the others lie close to them.
 _COARSE_BALL = [0, 1, 2, 4, 6, 8, 10, 11, 12, 15, 17, 19, 21, 22, 23, 24, 25, 26]
 _COARSE_CORNEA = [1, 3, 5, 7, 9, 12]
-# Where rings lie on the picture: the iris has most of it, what nobody sees has little.
+# Distances of the rings on the texture: the iris gets most of it, the hidden back little.
 IRIS_AT, SIDE_AT, SIDE_ANGLE = 0.26, 0.47, 1.4
 
 
 def surface(angle: Floats) -> Floats:
-    """float64[...]: how far the eye's surface is from the ball's middle, in radii of the ball.
+    """Distance of the eye's surface from the ball's middle, float64[...], in radii of the ball.
 
     Args:
         angle: float64[...], from the gaze, radians.
@@ -58,10 +60,10 @@ def surface(angle: Floats) -> Floats:
 
 
 def side_map(angle: Floats) -> Floats:
-    """float64[...]: distance from the middle of the picture, of what lies around the iris.
+    """Distance from the middle of the texture for a point outside the iris, float64[...].
 
     Args:
-        angle: float64[...], from the gaze, radians; that of the limbus at least.
+        angle: float64[...], from the gaze, radians; at least the limbus' angle.
     """
     low = IRIS_AT + (SIDE_AT - IRIS_AT) * (angle - _LIMBUS) / (SIDE_ANGLE - _LIMBUS)
     high = SIDE_AT + (0.5 - SIDE_AT) * (angle - SIDE_ANGLE) / (np.pi - SIDE_ANGLE)
@@ -69,10 +71,10 @@ def side_map(angle: Floats) -> Floats:
 
 
 def side_angle(away: Floats) -> Floats:
-    """float64[...]: the angle from the gaze; what side_map undoes.
+    """The angle from the gaze, float64[...]; the inverse of side_map.
 
     Args:
-        away: float64[...], distance from the middle of the picture, IRIS_AT at least.
+        away: float64[...], distance from the middle of the texture, at least IRIS_AT.
     """
     low = _LIMBUS + (SIDE_ANGLE - _LIMBUS) * (away - IRIS_AT) / (SIDE_AT - IRIS_AT)
     high = SIDE_ANGLE + (np.pi - SIDE_ANGLE) * (away - SIDE_AT) / (0.5 - SIDE_AT)
@@ -81,12 +83,13 @@ def side_angle(away: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Revolved:
-    """A surface of revolution: rings from front to back, a pole at one end or at both.
+    """A surface of revolution: rings from front to back, with a pole at one end or both.
 
     Attributes:
-        away, along: float64[rings], from the axis and along it, in radii of the ball.
-        map: float64[rings], distance from the middle of the picture.
-        poles: (along, map) of what closes it in front, and behind or None.
+        away, along: float64[rings], distance from the axis and position along it, in radii of the
+        ball.
+        map: float64[rings], distance from the middle of the texture.
+        poles: (along, map) of the front pole, and of the back pole or None.
     """
 
     away: Floats
@@ -105,11 +108,11 @@ class Revolved:
         return np.concatenate([rings.reshape(-1, 3), tips])
 
     def points(self) -> Floats:
-        """float64[vertices, 3] in radii of the ball, looking along +z; the poles last."""
+        """Positions, float64[vertices, 3], in radii of the ball, looking along +z; poles last."""
         return self._spread(self.away, self.along, [p[0] for p in self.poles if p])
 
     def uvs(self) -> Floats:
-        """float64[vertices, 2]."""
+        """Texture coordinates, float64[vertices, 2]."""
         flat = self._spread(self.map, 0 * self.map, [0.0 for p in self.poles if p])[:, :2]
         flat += 0.5
         if self.poles[1] is not None:
@@ -121,8 +124,8 @@ class Revolved:
 
         Args:
             first: index of the first vertex.
-            rings: those that are used, from front to back.
-            step: every which of their vertices is used.
+            rings: the rings to use, from front to back.
+            step: use every `step`-th vertex of a ring.
         """
         out = []
         tip = first + len(self.away) * SEGMENTS
@@ -173,12 +176,12 @@ _PARTS = (("eyeball", BALL, _COARSE_BALL), ("cornea", SHELL, _COARSE_CORNEA))
 
 
 def with_eyeballs(base: BaseMesh) -> BaseMesh:
-    """The base mesh with groups eyeball-l, cornea-l and so on, and coarse ones of their vertices.
+    """The base mesh with the groups eyeball-l, cornea-l and so on, and their coarse versions.
 
-    Where they are only a person says (`seat`): here all lie at the origin.
+    All new vertices lie at the origin; `seat` places them in a face.
 
     Args:
-        base: is left as it is; one that has them is given back.
+        base: is not changed; a mesh that already has eyeballs is returned as it is.
     """
     if "eyeball-l" in base.faces:
         return base
@@ -203,7 +206,7 @@ def with_eyeballs(base: BaseMesh) -> BaseMesh:
 
 
 def gaze(side: str) -> Floats:
-    """float64[3, 3]: how an eye is turned at rest: both meet far in front of the face.
+    """Rest rotation of an eye, float64[3, 3]: both gazes meet far in front of the face.
 
     Args:
         side: "l" or "r".
@@ -219,21 +222,21 @@ def seat(
     """Put an eyeball and its cornea into a face.
 
     Args:
-        positions: float64[V, 3], decimetres; those of the eye are changed in place.
+        positions: float64[V, 3], decimetres; the vertices of the eye are changed in place.
         groups: vertex indices by group of the base mesh.
         side: "l" or "r".
-        middle: float64[3], of the ball.
-        radius: of the ball, decimetres.
+        middle: float64[3], middle of the ball.
+        radius: radius of the ball, decimetres.
     """
     for name, shape, _ in _PARTS:
         positions[groups[f"{name}-{side}"]] = middle + radius * shape.points() @ gaze(side).T
 
 
 def pupil_wide(radius: float, side: str) -> Floats:
-    """float64[vertices of the ball, 3]: the iris drawn to its root, as if the pupil had all of it.
+    """Displacement of the iris to its root, as if the pupil filled it, float64[ball vertices, 3].
 
     Args:
-        radius: of the ball, decimetres.
+        radius: radius of the ball, decimetres.
         side: "l" or "r".
     """
     share = np.zeros(len(BALL.away))

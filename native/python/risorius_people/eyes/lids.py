@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lids that lie on the eye: at rest, in each expression, closed, and on the way between."""
+"""Lids that lie on the eye: at rest, in each expression, closed and half closed."""
 
 from __future__ import annotations
 
@@ -13,44 +13,45 @@ from . import eyeball
 from .eyeball import IRIS, MM
 from .rings import COLUMNS, LOWER, ROOT, TEMPLE, UPPER, smoothed
 
-# How far the rings from the lashes' roots to the inner rim lie above the eye, in mm: the skin's
-# edge, the middle of the rim, where it touches, and what is hidden in the ball.
+# Heights above the eye of the rings from the lashes' roots to the inner rim, mm: the skin's edge,
+# the middle of the rim, the contact with the eye, and the ring hidden in the ball.
 _HEIGHTS = np.array([1.35, 0.75, 0.22, -0.55])
 _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
-_FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])  # of the rings outside of it
+# weights of the rings outside the rim.
+_FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10
-_LIFT = 0.38  # mm: what lids are higher in a whole look, since they do not go round in half of one
-# Degrees that a look at 1 turns an eye, and how much further its lids go than the data's, whose
-# eyes turn by a third of that and leave the lower lids where they are.
+_LIFT = 0.38  # mm that lids rise in a full look: half a look does not carry them round the ball
+# Degrees that a look at 1 turns an eye, and the factor on the data's lid motion. The data's eyes
+# turn by a third of that and leave the lower lids still.
 LOOKS = {"Up": (25.0, 1.9), "Down": (30.0, 1.5), "Left": (30.0, 1.8), "Right": (30.0, 1.8)}
 _LOWER_LOOKS = {"Up": 1.2, "Down": -2.4}  # mm
-_SKIN = 0.9  # mm over the eye, what is around the rim at least
-# What pushes the lids into the eye where both of a pair do it.
+_SKIN = 0.9  # mm, smallest height of the skin around the rim above the eye
+# Pairs of controls that together push the lids into the eye.
 _TOGETHER = (
     ("eyeCheekRaise", "eyeSquintInner"),
     ("eyeCheekRaise", "eyeLookDown"),
     ("eyeCheekRaise", "eyeLookUp"),
     ("eyeSquintInner", "eyeLookDown"),
 )
-# What closed lids do not do beside it: they stay closed.
+# Expressions that do not move the lids of a closed eye.
 _NOT_CLOSED = [
     *(f"eyeLook{way}" for way in LOOKS),
     "eyeSquintInner",
     "eyeCheekRaise",
     "eyeUpperLidUp",
 ]
-WIDER = 0.75  # of the data's, which starts from lids that are half shut
-_FORWARD, _ASIDE = 1.5, 1.2  # mm: the ball from the data's, and how far at most up or down
-_RADIUS = 14.0  # mm: of the man's ball; sizes above are meant on it
-_MOVES = 0.03 * MM  # decimetres: what moves lids less leaves them alone
+WIDER = 0.75  # factor on the data's displacement, which starts from half-shut lids
+_FORWARD, _ASIDE = 1.5, 1.2  # mm: offset from the data's ball, and its largest offset up or down
+_RADIUS = 14.0  # mm, radius of the man's ball; the sizes above refer to it
+_MOVES = 0.03 * MM  # decimetres: displacements below this leave the lids alone
 
 
 def rotation(degrees: float, axis: int) -> Floats:
     """float64[3, 3]: a rotation.
 
     Args:
-        degrees: by how much.
-        axis: about x (0), y (1) or z (2).
+        degrees: the angle.
+        axis: rotation axis: x (0), y (1) or z (2).
     """
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     out = np.eye(3)
@@ -61,10 +62,10 @@ def rotation(degrees: float, axis: int) -> Floats:
 
 
 def look_rotation(way: str) -> Floats:
-    """float64[3, 3]: what a look at 1 turns an eye by.
+    """Rotation of an eye by a look at 1, float64[3, 3].
 
     Args:
-        way: "Up", "Down", "Left" or "Right", as the character has them.
+        way: "Up", "Down", "Left" or "Right", from the character's point of view.
     """
     sign = 1 if way in ("Down", "Left") else -1
     return rotation(sign * LOOKS[way][0], 0 if way in ("Up", "Down") else 1)
@@ -72,14 +73,14 @@ def look_rotation(way: str) -> Floats:
 
 @dataclass
 class Lids:
-    """The lids of one eye and the ball that they lie on.
+    """The lids of one eye and its ball.
 
     Attributes:
         side: "l" or "r".
         rings: int64[13, COLUMNS], see find_rings.
-        openness: how far the upper lid is above the middle, 1: at the iris' rim.
-        middle: float64[3] of the ball, decimetres.
-        radius: of the ball, decimetres.
+        openness: height of the upper lid above the ball's middle, in radii of the iris.
+        middle: float64[3], middle of the ball, decimetres.
+        radius: radius of the ball, decimetres.
         raw: float64[V, 3], the positions before the lids were opened.
         rest: float64[V, 3], the positions after it.
     """
@@ -93,16 +94,16 @@ class Lids:
     rest: Floats
 
     def grid(self, values: Floats) -> Floats:
-        """float64[13, COLUMNS, 3]: values of the rings' vertices."""
+        """Values of the rings' vertices, float64[13, COLUMNS, 3]."""
         return np.asarray(values[self.rings])
 
     def seated(self, grid: Floats, turn: Floats | None = None, lift: float = 0.0) -> Floats:
-        """A grid whose rim lies on the eye, what is around it drawn along.
+        """A grid with its rim laid on the eye; the skin around the rim follows.
 
         Args:
             grid: float64[13, COLUMNS, 3].
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
-            lift: mm, how much higher than at rest.
+            turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
+            lift: mm above the rest height.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -117,7 +118,7 @@ class Lids:
             out[_EDGE] += lack[:, :, None] * ray[_EDGE]
             drawn = _FADE[::-1, None] * lack[0]
             out[:ROOT] += drawn[:, :, None] * ray[:ROOT]
-        # Skin that is pushed up below the rim lies over the eye as well.
+        # Skin below the rim that is pushed up must lie over the eye too.
         arm = out[:ROOT] - self.middle
         length = np.linalg.norm(arm, axis=2)
         angle = np.arccos(np.clip(arm @ gaze / length, -1, 1))
@@ -126,11 +127,11 @@ class Lids:
         return out
 
     def heights(self, grid: Floats, turn: Floats | None = None) -> Floats:
-        """float64[4, COLUMNS]: how far the rim's rings are above the eye, decimetres.
+        """Heights of the rim's rings above the eye, float64[4, COLUMNS], decimetres.
 
         Args:
             grid: float64[13, COLUMNS, 3].
-            turn: float64[3, 3], what the eye is turned by; None: it rests.
+            turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
         """
         gaze = eyeball.gaze(self.side)[:, 2]
         gaze = gaze if turn is None else turn @ gaze
@@ -143,12 +144,12 @@ class Lids:
 def place_ball(
     positions: Floats, groups: dict[str, Ints], rings: Ints, side: str
 ) -> tuple[Floats, float]:
-    """Middle and radius of the ball that the lids of the data fit.
+    """Middle and radius of the ball that fits the lids of the data.
 
     Args:
         positions: float64[V, 3] of a person, decimetres.
         groups: vertex indices by group of the base mesh.
-        rings: of this eye.
+        rings: the rings of this eye.
         side: "l" or "r".
     """
     ball = groups[f"helper-{side}-eye"]
@@ -163,14 +164,14 @@ def place_ball(
 
 
 def open_lids(lids: Lids, widen: Floats) -> Floats:
-    """Bring the lids of a person to where they rest: `rest` of them is changed.
+    """Open the lids of a person to their rest pose; changes `rest`.
 
     Args:
-        lids: `rest` as the data have it.
-        widen: float64[V, 3], what opens the upper lid further, of the data.
+        lids: `rest` is as in the data.
+        widen: float64[V, 3], displacement of the data that widens the eye.
 
     Returns:
-        float64[V, 3], how much of it was taken.
+        The applied share of `widen`, float64[V, 3].
     """
     iris = IRIS * lids.radius
     edge = smoothed(lids.grid(lids.rest))[ROOT + 2] - lids.middle
@@ -190,7 +191,8 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
 
 
 def _lower_lid(grid: Floats) -> Floats:
-    """float64[13, COLUMNS, 1]: 1 in the middle of the lower lid's rim, 0 at corners and cheek."""
+    """Weight of the lower lid, float64[13, COLUMNS, 1]: 1 at the rim's middle, 0 at corners and
+    cheek."""
     rows = np.ones(len(grid))
     rows[:ROOT] = np.linspace(0, 1, ROOT) ** 2
     columns = np.zeros(COLUMNS)
@@ -199,19 +201,20 @@ def _lower_lid(grid: Floats) -> Floats:
 
 
 def _lower_closed(lids: Lids) -> Floats:
-    """float64[13, COLUMNS, 3]: the grid with its lower lid where it meets the upper one."""
+    """The grid with the lower lid raised to where it meets the upper lid, float64[13, COLUMNS,
+    3]."""
     grid = lids.grid(lids.rest)
     way = np.array([-0.7 * np.sign(lids.middle[0]), 0.7, 0.0]) * MM
     return np.asarray(grid + _lower_lid(grid) * way)
 
 
 def following(lids: Lids, way: str, look: Floats) -> Floats:
-    """float64[V, 3]: what the lids do when the eye looks further than in the data.
+    """Displacement of the lids when the eye looks further than in the data, float64[V, 3].
 
     Args:
         lids: at rest.
         way: "Up", "Down", "Left" or "Right".
-        look: float64[V, 3], of the data.
+        look: float64[V, 3], the data's look.
     """
     out = LOOKS[way][1] * look
     lower = _lower_lid(lids.rings)[:, :, 0] * _LOWER_LOOKS.get(way, 0.0) * MM
@@ -220,13 +223,14 @@ def following(lids: Lids, way: str, look: Floats) -> Floats:
 
 
 def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
-    """float64[V, 3]: what closes the lids to one line, from where they rest; and without the line.
+    """Displacement from rest that closes the lids to one line, and the same without the line.
 
-    The data's way is kept, but shortened: it leads the upper lid past the lower one.
+    Both are float64[V, 3]. The data's displacement is shortened: whole, it moves the upper lid past
+    the lower lid.
 
     Args:
         lids: at rest.
-        blink: float64[V, 3], the way of the data from where their lids are.
+        blink: float64[V, 3], displacement of the data from the data's lids.
     """
     closed = _lower_closed(lids)
     before, way = lids.grid(lids.raw), lids.grid(blink)
@@ -257,7 +261,7 @@ def closing(lids: Lids, blink: Floats) -> tuple[Floats, Floats]:
 
 
 def _meeting(start: Floats, way: Floats, line: Floats) -> float:
-    """The share of a way after which it is as low as a line at its x.
+    """The share of a displacement at which a point is as low as a line at its x.
 
     Args:
         start: float64[3].
@@ -275,7 +279,7 @@ def _meeting(start: Floats, way: Floats, line: Floats) -> float:
 
 
 def _even(share: Floats, known: Floats) -> Floats:
-    """Shares by column: the unknown ones are those of the nearest known column, then smoothed.
+    """Shares by column: unknown columns get the nearest known share, then all are smoothed.
 
     Args:
         share: float64[COLUMNS].
@@ -290,12 +294,12 @@ def _even(share: Floats, known: Floats) -> Floats:
 
 
 def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
-    """float64[V, 3]: the way of the skin that is not of the grid, without what opened it.
+    """Displacement of the skin outside the grid, without the part that opened it, float64[V, 3].
 
     Args:
         lids: at rest.
-        blink: float64[V, 3], of the data.
-        share: float64[COLUMNS], how much of it.
+        blink: float64[V, 3], displacement of the data.
+        share: float64[COLUMNS], the share of `blink` to use.
     """
     out = np.zeros_like(blink)
     moved = np.flatnonzero(np.abs(blink).max(axis=1) > 1e-7)
@@ -307,11 +311,12 @@ def _scaled(lids: Lids, blink: Floats, share: Floats) -> Floats:
 
 
 def between(lids: Lids, way: Floats) -> Floats:
-    """float64[V, 3]: what half-closed lids lack, who go straight and not round the ball.
+    """Displacement for half-closed lids, which move straight instead of round the ball, float64[V,
+    3].
 
     Args:
         lids: at rest.
-        way: float64[V, 3], of lids that close.
+        way: float64[V, 3], displacement that closes the lids.
     """
     half = lids.grid(lids.rest + way / 2)
     out = np.zeros_like(way)
@@ -320,12 +325,12 @@ def between(lids: Lids, way: Floats) -> Floats:
 
 
 def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
-    """float64[V, 3]: a way of the skin whose lids stay on the eye.
+    """A displacement of the skin with its lids laid on the eye, float64[V, 3].
 
     Args:
         lids: at rest.
         way: float64[V, 3].
-        turn: float64[3, 3], what the eye is turned by; None: it rests.
+        turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
     """
     grid = lids.grid(way)
     if turn is None and np.linalg.norm(grid[_EDGE], axis=2).max() < _MOVES:
@@ -337,13 +342,13 @@ def on_the_ball(lids: Lids, way: Floats, turn: Floats | None = None) -> Floats:
 
 
 def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) -> Floats:
-    """float64[V, 3]: what to add where lids are closed and do something else too.
+    """Displacement to add when closed lids get a second expression, float64[V, 3].
 
     Args:
         lids: at rest.
-        blink: float64[V, 3], what closes them.
-        other: float64[V, 3], what they do too.
-        turn: float64[3, 3], what the eye is turned by meanwhile; None: it rests.
+        blink: float64[V, 3], displacement that closes the lids.
+        other: float64[V, 3], displacement of the second expression.
+        turn: float64[3, 3], rotation of the eye by the second expression; None: the eye is at rest.
     """
     rows = np.ones(len(lids.rings))
     rows[:ROOT] = np.linspace(0, 1, ROOT)
@@ -354,19 +359,19 @@ def stays_closed(lids: Lids, blink: Floats, other: Floats, turn: Floats | None) 
 
 
 def stays_on_the_ball(lids: Lids, one: Floats, other: Floats, turn: Floats | None) -> Floats:
-    """float64[V, 3]: what to add where two controls push the lids at once, into the eye.
+    """Displacement to add when two controls together push the lids into the eye, float64[V, 3].
 
     Args:
         lids: at rest.
-        one, other: float64[V, 3], what each does alone.
-        turn: float64[3, 3], what the eye is turned by meanwhile; None: it rests.
+        one, other: float64[V, 3], displacement of each control.
+        turn: float64[3, 3], rotation of the eye; None: the eye is at rest.
     """
     both = one + other
     return on_the_ball(lids, both, turn) - both
 
 
 def together(names: Mapping[str, object], side: str) -> list[tuple[str, str]]:
-    """Pairs of raw controls that push the lids into the eye, of those that there are.
+    """Pairs of existing raw controls that together push the lids into the eye.
 
     Args:
         names: raw controls.
@@ -377,7 +382,7 @@ def together(names: Mapping[str, object], side: str) -> list[tuple[str, str]]:
 
 
 def partners(names: Mapping[str, object], side: str) -> list[str]:
-    """Raw controls that closed lids do not follow, of those that there are.
+    """Existing raw controls that must leave closed lids still.
 
     Args:
         names: raw controls.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The meshes of the eyes: balls, corneas, the tears' edge along the lower lids, caruncles."""
+"""The meshes of the eyes: balls, corneas, tear lines along the lower lids, caruncles."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _BALLS = {
     "eyeRight": ["eyeball-r"],
     "cornea": ["cornea-l", "cornea-r"],
 }
-# Sections of the caruncle: how far from the corner in columns, how far in on the rim, how high
-# over the line between both rims, in thicknesses of a lid.
+# Sections of the caruncle: columns from the corner, distance in on the rim, and height over the
+# line between both rims, in lid thicknesses.
 _MOUND = (
     (0, 0.35, -0.02),
     (0, 1.0, 0.10),
@@ -28,16 +28,16 @@ _MOUND = (
     (4, 2.7, -0.15),
 )
 _APART = 0.12
-Row = dict[int, float]  # shares by vertex of the base mesh, together 1
+Row = dict[int, float]  # weights by vertex of the base mesh, with sum 1
 
 
 def eye_parts(base: BaseMesh, groups: dict[str, Ints], lod: int) -> list[Part]:
-    """All meshes of the eyes at a level.
+    """All meshes of the eyes at one LOD.
 
     Args:
         base: the base mesh with its eyeballs.
         groups: vertex indices by group.
-        lod: 0, or 1 for the coarse ones.
+        lod: 0, or 1 for the coarse meshes.
     """
     out = []
     for name, own in _BALLS.items():
@@ -93,12 +93,12 @@ def _mixed(*parts: tuple[float, Row]) -> Row:
 
 
 def _on_skin(rings: Ints, row: int, column: int) -> Row:
-    """Where a vertex of the lids lies after one step of Catmull-Clark, as on the finest skin.
+    """Weights of a lid vertex after one Catmull-Clark step, as on the finest skin.
 
     Args:
-        rings: of the eye.
-        row: not the first and not the last.
-        column: of the grid.
+        rings: the rings of the eye.
+        row: row of the grid, not the first and not the last.
+        column: column of the grid.
     """
     out: Row = {}
     for down in (-1, 0, 1):
@@ -110,12 +110,12 @@ def _on_skin(rings: Ints, row: int, column: int) -> Row:
 
 
 def _rim(rings: Ints, at: float, column: int) -> Row:
-    """A place on a lid's rim.
+    """Weights of a point on a lid's rim.
 
     Args:
-        rings: of the eye.
-        at: 0 at the lashes' roots, 1 and 2 further in; between 2 and 3 the rim meets the eye.
-        column: of the grid.
+        rings: the rings of the eye.
+        at: 0 at the lashes' roots, 1 and 2 further in; from 2 to 3 the rim meets the eye.
+        column: column of the grid.
     """
     row = min(int(at), 2)
     low, high = (_on_skin(rings, ROOT + row + k, column) for k in (0, 1))
@@ -123,13 +123,14 @@ def _rim(rings: Ints, at: float, column: int) -> Row:
 
 
 def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
-    """The tears between lower lid and eye: a hollow strip from the rim to the ball.
+    """The tear line between lower lid and eye: a hollow strip from the rim to the ball.
 
     Args:
-        rings: of the eye.
+        rings: the rings of the eye.
 
     Returns:
-        The vertices as shares of the base mesh's, faces, float64[vertices, 2].
+        Vertices as weights of the base mesh's vertices, faces, and texture coordinates
+        float64[vertices, 2].
     """
     rows: list[Row] = []
     columns = list(range(LOWER.stop - 1, TEMPLE - 1, -1))  # from the nose to the temple
@@ -152,19 +153,19 @@ def _tears(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
 
 
 def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
-    """The pink flesh in the corner at the nose: a mound between both rims that sinks into the eye.
+    """The pink flesh in the eye's inner corner: a mound between both rims that sinks into the eye.
 
     Args:
-        rings: of the eye.
+        rings: the rings of the eye.
 
     Returns:
-        As _tears.
+        The same as _tears.
     """
     rows: list[Row] = []
     # How far from the corner in columns, how far in on the rim, how high the mound is.
     for aside, at, high in _MOUND:
         upper, lower = (_rim(rings, at, column) for column in (aside, (COLUMNS - aside) % COLUMNS))
-        if aside == 0:  # one column: a little of its neighbours, so that no two vertices coincide
+        if aside == 0:  # mix in the neighbours, so that no two vertices coincide
             upper = _mixed((1 - _APART, upper), (_APART, _rim(rings, at, 1)))
             lower = _mixed((1 - _APART, lower), (_APART, _rim(rings, at, COLUMNS - 1)))
         skin = _mixed((0.5, _rim(rings, 0.0, aside)), (0.5, _rim(rings, 0.0, -aside % COLUMNS)))
@@ -176,7 +177,7 @@ def _caruncle(rings: Ints) -> tuple[list[Row], list[list[int]], Floats]:
 
 
 def _strip(rows: list[Row], across: int) -> tuple[list[Row], list[list[int]], Floats]:
-    """Quads over rows of so many vertices each, seen from the front."""
+    """Quads between rows of `across` vertices each, seen from the front."""
     length = len(rows) // across
     faces = []
     for k in range(length - 1):

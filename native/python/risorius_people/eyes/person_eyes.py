@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The eyes of a person: where the balls are, how lids rest, and what all controls do with them."""
+"""The eyes of a person: place of the balls, rest pose of the lids, and their expressions."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from . import eyeball, lids
 from .lids import Lids
 from .rings import ROOT, find_rings
 
-_AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)  # how far upper lids are above the eye's middle
+# by age: height of the upper lids above the eye's middle, in radii of the iris.
+_AGES, _OPEN = (8, 30, 75), (0.78, 0.70, 0.60)
 _SIDES = (("l", "L"), ("r", "R"))
 _LASH_RINGS = slice(ROOT - 1, ROOT + 1)
 Units = dict[str, Floats]
@@ -24,18 +25,18 @@ class Eyes:
     """The eyes of a person.
 
     Attributes:
-        lids: by "l" and "r".
+        lids: the lids of each eye, by "l" and "r".
     """
 
     def __init__(
         self, base: BaseMesh, groups: dict[str, Ints], positions: Floats, age: float
     ) -> None:
-        """Put eyeballs into a face; the lids are still where the data have them.
+        """Put eyeballs into a face; the lids stay as in the data.
 
         Args:
             base: the base mesh.
             groups: vertex indices by group of the base mesh.
-            positions: float64[V, 3], decimetres; those of eyes are changed in place.
+            positions: float64[V, 3], decimetres; the vertices of the eyes are changed in place.
             age: years.
         """
         self._groups = groups
@@ -49,7 +50,7 @@ class Eyes:
             openness = float(np.interp(age, _AGES, _OPEN))
             raw = positions.copy()
             self.lids[side] = Lids(side, rings[side], openness, middle, radius, raw, raw.copy())
-        for eye in self.lids.values():  # the other eye was not there yet
+        for eye in self.lids.values():  # set again after both eyes are placed
             eye.raw, eye.rest = positions.copy(), positions.copy()
 
     def open(self, positions: Floats, widen: Mapping[str, Floats]) -> None:
@@ -57,7 +58,7 @@ class Eyes:
 
         Args:
             positions: float64[V, 3] of the person, decimetres; changed in place.
-            widen: float64[V, 3] by "L" and "R": what opens the lids further, of the data.
+            widen: float64[V, 3] by "L" and "R": displacement of the data that widens the eye.
         """
         for side, letter in _SIDES:
             eye = self.lids[side]
@@ -68,12 +69,13 @@ class Eyes:
             eye.rest = positions.copy()
 
     def _with_lashes(self, eye: Lids, way: Floats, before: Floats) -> Floats:
-        """A way whose lashes go where the skin below them goes.
+        """A displacement whose lashes follow the skin at their roots.
 
         Args:
-            eye: whose lashes.
-            way: float64[V, 3]; that of the lashes is changed in place.
-            before: float64[V, 3], the skin's way that the lashes have followed already.
+            eye: the eye of the lashes.
+            way: float64[V, 3]; the displacement of the lashes is changed in place.
+            before: float64[V, 3], the part of the skin's displacement that `way` already has for
+                the lashes.
         """
         roots = eye.rings[_LASH_RINGS].ravel()
         for number in (1, 2):
@@ -84,14 +86,14 @@ class Eyes:
         return way
 
     def move(self, units: Units) -> Correctives:
-        """What controls do with these eyes and lids, in place of what the data have.
+        """Replace the data's motions of eyes and lids by motions that fit these eyes.
 
         Args:
-            units: float64[V, 3] by raw control; those that move eyes or lids are changed.
+            units: float64[V, 3] by raw control; controls that move eyes or lids are changed.
 
         Returns:
-            float64[V, 3] of correctives by their two raw controls. Where both are the same one, its
-            square, the control has as much less by itself: at 1 it does what `units` says.
+            Correctives, float64[V, 3] by two raw controls. A pair of the same control fires with
+            its square, and the control alone must then do that much less: at 1 the sum is `units`.
         """
         correctives: Correctives = {}
         for side, letter in _SIDES:
@@ -115,13 +117,14 @@ class Eyes:
                 turn = turns.get(other)
                 more = lids.stays_on_the_ball(eye, units[one], units[other], turn)
                 correctives[(one, other)] = self._with_lashes(eye, more, still)
-            # 4 x (1 - x) of it: nothing where lids are open or closed, the whole half way.
+            # With the control's own share the sum is 4 x (1 - x) * half: 0 open and closed, half
+            # in between.
             correctives[(blink, blink)] = -4 * half
             units[blink] = closed
         return correctives
 
     def _looks(self, eye: Lids, units: Units, letter: str) -> None:
-        """Eyes turn about their middle; lids follow further than in the data."""
+        """Rotate the eyes about their middle; the lids follow further than in the data."""
         names = ("helper-{}-eye", "eyeball-{}", "cornea-{}")
         own = np.concatenate([self._groups[name.format(eye.side)] for name in names])
         for way in lids.LOOKS:

@@ -8,8 +8,8 @@ import numpy as np
 from ..polygons import Floats, Ints, edges_of
 from ..source import BaseMesh
 
-OUTER, INNER = 8, 4  # rings outside of that of the lashes' roots, and inside of it
-ROOT = OUTER  # the row of the ring at the lashes' roots; ROOT + 3 is the inner rim, within the ball
+OUTER, INNER = 8, 4  # rings outside and inside the ring of the lashes' roots
+ROOT = OUTER  # row of the lashes' roots; row ROOT + 3 is the inner rim, inside the ball
 COLUMNS = 28
 UPPER, TEMPLE, LOWER = slice(1, 14), 14, slice(15, 28)  # column 0 is the corner at the nose
 Faces = list[list[int]]
@@ -17,12 +17,12 @@ Edges = dict[tuple[int, int], list[int]]
 
 
 def find_rings(base: BaseMesh, groups: dict[str, Ints]) -> dict[str, Ints]:
-    """int64[OUTER + 1 + INNER, COLUMNS] of vertices by side, "l" and "r".
+    """Vertices of the rings by side ("l" and "r"), int64[OUTER + 1 + INNER, COLUMNS].
 
-    Column 0 is the corner at the nose, then follow the upper lid, the other corner, the lower lid.
+    Column 0 is the inner corner; then follow the upper lid, the outer corner and the lower lid.
 
     Args:
-        base: the base mesh, whose faces are quads in regular rings around each eye.
+        base: the base mesh; its faces are quads in regular rings around each eye.
         groups: vertex indices by group.
     """
     faces = [[c[0] for c in face] for face in base.faces["body"]]
@@ -45,7 +45,7 @@ def _rings(
     first: list[int],
 ) -> Ints:
     ahead = [_beside(first, faces, edges, way) for way in (0, 1)]
-    # The ring towards the socket lies nearer to the eye's middle.
+    # The inner ring is nearer to the eye's middle.
     middle = base.positions[groups[f"helper-{side}-eye"]].mean(axis=0)
     ahead.sort(key=lambda ring: np.linalg.norm(base.positions[ring] - middle, axis=1).mean())
     inside, outside = [first, ahead[0]], [first, ahead[1]]
@@ -63,7 +63,7 @@ def _rings(
 
 
 def _lash_root(base: BaseMesh, groups: dict[str, Ints], side: str) -> int:
-    """The skin's vertex that is nearest to an upper lash."""
+    """The skin vertex nearest to an upper lash."""
     body = groups["body"]
     lashes = base.positions[groups[f"helper-{side}-eyelashes-2"]]
     middle = lashes[np.abs(lashes[:, 0] - lashes[:, 0].mean()).argsort()[:12]]
@@ -72,12 +72,12 @@ def _lash_root(base: BaseMesh, groups: dict[str, Ints], side: str) -> int:
 
 
 def _lash_ring(faces: Faces, edges: Edges, beside: dict[int, list[int]], root: int) -> list[int]:
-    """The closed loop of edges through a vertex of the skin.
+    """The closed loop of edges through a skin vertex.
 
     Args:
         faces: quads.
         edges: the faces of each edge.
-        beside: the vertices that each has an edge to.
+        beside: the neighbours of each vertex along edges.
         root: the vertex.
     """
     for start in beside[root]:
@@ -101,7 +101,7 @@ def _beside(ring: list[int], faces: Faces, edges: Edges, way: int) -> list[int]:
         ring: vertices of a closed loop of edges.
         faces: quads.
         edges: the faces of each edge.
-        way: 0 or 1, to which side.
+        way: the side: 0 or 1.
     """
     out = []
     face = edges[(min(ring[:2]), max(ring[:2]))][way]
@@ -116,9 +116,9 @@ def _beside(ring: list[int], faces: Faces, edges: Edges, way: int) -> list[int]:
 
 
 def smoothed(grid: Floats) -> Floats:
-    """float64[rings, columns, k]: where one step of Catmull-Clark brings the rings' vertices.
+    """The rings' vertices after one Catmull-Clark step, float64[rings, columns, k].
 
-    The first and the last ring are left as they are.
+    The first and the last ring stay as they are.
 
     Args:
         grid: float64[rings, columns, k].

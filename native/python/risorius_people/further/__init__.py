@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Controls beyond the 52 ARKit units: of the data's shapes, and by our code where it has none."""
+"""Controls beyond the 52 ARKit units, from the data's shapes or from code."""
 
 from .places import find_places
 from .recipes import CONTROLS_OF_CODE, further_units, unit_shape

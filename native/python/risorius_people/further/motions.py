@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Motions by our own code where the data have none: lids, lashes, pupils, neck, teeth and tongue.
+"""Motions made by code: lids, lashes, pupils, neck, teeth and tongue.
 
-Each takes the places of a face and `by` of its row in further.toml, and gives float64[V, 3].
+Each motion takes the places of a face and `by` from its row in further.toml; it returns float64[V,
+3].
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from ..polygons import Floats
 from .places import MM, Places, bell, nearest
 
 Motion = Callable[[Places, object], Floats]
-_PUPIL, _IRIS = 9.5, 25.0  # degrees from the gaze, as they are painted
-_TIP = 0.68  # of the tongue's length, where its tip begins
+_PUPIL, _IRIS = 9.5, 25.0  # degrees from the gaze on the painted texture
+_TIP = 0.68  # share of the tongue's length where its tip begins
 
 
 def _turned(points: Floats, pivot: Floats, degrees: Floats) -> Floats:
-    """The way of points that turn about a pivot, each by its own rotation vector (Rodrigues).
+    """Displacement of points that rotate about a pivot, each by a rotation vector (Rodrigues).
 
     Args:
         points: float64[n, 3].
@@ -51,7 +52,7 @@ def _lid_turn(places: Places, by: object) -> Floats:
 
 
 def _lid_press(places: Places, _: object) -> Floats:
-    """Both lids towards where they meet, towards the nose, and out: what closed eyes do harder."""
+    """Press both lids together, towards the nose and outwards, as tightly closed eyes do."""
     upper, lower = places.lids["U"][:, None], places.lids["D"][:, None]
     turn = _lid_turn(places, 1) / 0.15
     inwards = np.zeros_like(turn)
@@ -63,7 +64,7 @@ def _lid_press(places: Places, _: object) -> Floats:
 
 
 def _lashes_up(places: Places, by: object) -> Floats:
-    """Upper lashes up about their roots; -1: the half at the nose, 1: that at the temple."""
+    """Turn upper lashes up about their roots; -1: the nose half, 1: the temple half."""
     positions, groups = places.positions, places.groups
     out = np.zeros_like(positions)
     for letter in "lr":
@@ -77,12 +78,12 @@ def _lashes_up(places: Places, by: object) -> Floats:
 
 
 def _lashes_down(places: Places, by: object) -> Floats:
-    """Upper lashes down about their roots; -1: the half at the nose, 1: that at the temple."""
+    """Turn upper lashes down about their roots; -1: the nose half, 1: the temple half."""
     return -_lashes_up(places, by) * np.array([1.0, 1.0, -1.0])
 
 
 def _pupil(places: Places, by: object) -> Floats:
-    """The rim of the _pupil along the ball; 1: wider, -1: narrower. The iris keeps its rim."""
+    """Move the rim of the pupil along the ball; 1: wider, -1: narrower. The iris' rim stays."""
     out = np.zeros_like(places.positions)
     for side, middle in places.eyes.items():
         eye = places.groups[f"helper-{side.lower()}-eye"]
@@ -100,7 +101,7 @@ def _pupil(places: Places, by: object) -> Floats:
 
 
 def _mastoid(places: Places, _: object) -> Floats:
-    """The muscle from behind the ear to the breastbone swells."""
+    """Swell the muscle from behind the ear to the breastbone."""
     top, bottom = np.array([0.6, 15.55, 0.35]), np.array([0.1, 14.35, 0.72])
     points = places.positions * [1, 1, 1]
     points[:, 0] = np.abs(points[:, 0])
@@ -120,7 +121,7 @@ def _teeth(group: str) -> Motion:
 
 
 def _on_tongue(places: Places) -> tuple[Floats, Floats, Floats]:
-    """Vertices of the tongue, their positions, and how far each is from root (0) to tip (1)."""
+    """Vertices of the tongue, their positions, and their place from root (0) to tip (1)."""
     tongue = places.groups["helper-tongue"]
     points = places.positions[tongue]
     low, high = points[:, 2].min(), points[:, 2].max()
@@ -134,13 +135,13 @@ def _of_tongue(places: Places, way: Floats) -> Floats:
 
 
 def _root(points: Floats, share: Floats, begin: float) -> Floats:
-    """The middle of the tongue at a share of its length: what turns beyond it turns about this."""
+    """The middle of the tongue at a share of its length: the pivot of everything beyond it."""
     near = np.argsort(np.abs(share - begin))[:24]
     return np.asarray(points[near].mean(axis=0) * [0, 1, 1])
 
 
 def _tongue_way(places: Places, by: object) -> Floats:
-    """Goes along `by`, the more the nearer to the tip."""
+    """Shift the tongue along `by`; the tip moves most."""
     _, _, share = _on_tongue(places)
     return _of_tongue(places, smooth_step(share / 0.6)[:, None] * _vector(by))
 
@@ -149,7 +150,7 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
     def move(places: Places, by: object) -> Floats:
         _, points, share = _on_tongue(places)
         beyond = np.clip((share - begin) / (1 - begin), 0, 1) ** power
-        # Up is against the sense of a rotation about the character's left.
+        # Up is a negative rotation about the character's left.
         degrees = beyond[:, None] * _vector(by) * [-1, 1, 1]
         return _of_tongue(places, _turned(points, _root(points, share, begin), degrees))
 
@@ -157,7 +158,7 @@ def _tongue_rotation(power: float, begin: float) -> Motion:
 
 
 def _tongue_scale(places: Places, by: object) -> Floats:
-    """Wider and higher by shares of its own width and height; the root stays."""
+    """Scale the tongue's width and height; the root stays."""
     _, points, share = _on_tongue(places)
     middle = np.zeros_like(points)
     for at in np.unique(share.round(2)):
@@ -168,7 +169,7 @@ def _tongue_scale(places: Places, by: object) -> Floats:
 
 
 def _tongue_roll(places: Places, _: object) -> Floats:
-    """The sides come up."""
+    """Raise the sides."""
     _, points, share = _on_tongue(places)
     aside = np.abs(points[:, 0]) / np.abs(points[:, 0]).max()
     way = np.column_stack([-0.35 * np.sign(points[:, 0]) * aside, aside**2, 0 * aside])
@@ -176,7 +177,7 @@ def _tongue_roll(places: Places, _: object) -> Floats:
 
 
 def _tongue_press(places: Places, _: object) -> Floats:
-    """The middle comes up to the palate and spreads, the tip stays."""
+    """Press the middle against the palate; it spreads, and the tip stays."""
     _, points, share = _on_tongue(places)
     bump = np.exp(-(((share - 0.55) / 0.25) ** 2))
     way = np.column_stack(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where lips, lids and brows are on the base mesh, as weights of its vertices."""
+"""Weights of the base mesh's vertices for lips, lids and brows."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..polygons import Floats, Ints
 from ..source import BaseMesh
 
 MM = 0.01  # the data are in decimetres
-_TOUCHING = 0.03  # how far a lip's vertex is at most from the other lip
-_PARTED = 0.04  # how much further the jaw takes them apart at least
-_BETWEEN = 0.03  # the width of what belongs to both lips, at the corners
-_LID = 0.035  # how far the skin of a lid reaches from the roots of its lashes
+_TOUCHING = 0.03  # largest distance of a lip vertex from the other lip
+_PARTED = 0.04  # smallest distance that the opening jaw adds
+_BETWEEN = 0.03  # width of the blend between the lips at the corners
+_LID = 0.035  # how far a lid's skin extends from the roots of its lashes
 _CHUNK = 256
 
 
 def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
-    """Of each point: the nearest of the others, and how far it is.
+    """The index of the nearest other point for each point, and its distance.
 
     Args:
         points: float64[n, 3].
@@ -41,7 +41,7 @@ def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
 
 
 def bell(distance: Floats) -> Floats:
-    """float64[n]: 1 at 0, falling as a normal distribution does.
+    """A bell curve with value 1 at 0, float64[n].
 
     Args:
         distance: float64[n], in standard deviations.
@@ -51,19 +51,19 @@ def bell(distance: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Places:
-    """What the further controls are made at. Arrays are by vertex of the base mesh, decimetres.
+    """Places for the further controls. Arrays are by vertex of the base mesh, in decimetres.
 
     Attributes:
-        positions: float64[V, 3] of the man; his left is +x, he looks along +z.
+        positions: float64[V, 3] of the man; his left is +x and he looks along +z.
         normals: float64[V, 3].
         groups: vertex indices by group of the base mesh.
         skin: float64[V], 1 on the body.
-        lips: float64[V] by "U" and "D", which lip's side a vertex is on.
+        lips: float64[V] by "U" and "D", weight of the lip.
         along: float64[V], 0 in the middle of the lips, 1 and -1 at their corners.
-        lip_distance: float64[V], from where the lips touch.
-        lids: float64[V] by "U" and "D", of both eyes, lashes too.
-        brows: float64[V], both.
-        eyes: float64[3], the middle of each eye, by "L" and "R".
+        lip_distance: float64[V], distance from the line where the lips touch.
+        lids: float64[V] by "U" and "D", weight of the lids of both eyes, lashes included.
+        brows: float64[V], weight of both brows.
+        eyes: float64[3] by "L" and "R", the middle of each eye.
     """
 
     positions: Floats
@@ -78,7 +78,7 @@ class Places:
     eyes: dict[str, Floats]
 
     def eye_of(self) -> Floats:
-        """float64[V, 3]: the middle of the eye on the side of each vertex."""
+        """The middle of the eye on the side of each vertex, float64[V, 3]."""
         left = self.positions[:, :1] > 0
         return np.where(left, self.eyes["L"], self.eyes["R"])
 
@@ -96,8 +96,8 @@ def find_places(
         base: has the polygons.
         positions: float64[V, 3], decimetres.
         groups: vertex indices by group of the base mesh.
-        jaw_open: float64[V, 3], the motion of an opening jaw, which tells the lips apart.
-        brow_shapes: float64[V, 3], the summed motion of brows that go up and down.
+        jaw_open: float64[V, 3], displacement of the opening jaw; it separates the lips.
+        brow_shapes: float64[V, 3], sum of the displacements of brows that go up and down.
     """
     count = len(positions)
     faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
@@ -107,7 +107,7 @@ def find_places(
     line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
     corner = np.abs(line[:, 0]).max()
     _, lip_distance = nearest(positions, line)
-    # An even curve of height over width: the lips touch over some millimetres, not on a line.
+    # A parabola of height over width: the lips touch over some millimetres, not along a line.
     height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
     aside = np.minimum(np.abs(positions[:, 0]), corner)
     upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)
@@ -127,13 +127,13 @@ def find_places(
 
 
 def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: Floats) -> Ints:
-    """Vertices of a lip that lie at the other one, with no face between, until the jaw opens.
+    """Lip vertices close to the other lip, without a common face, that the opening jaw parts.
 
     Args:
         positions: float64[V, 3], decimetres.
         faces: vertices by face.
         body: vertices of the skin.
-        jaw_open: float64[V, 3], the motion of an opening jaw.
+        jaw_open: float64[V, 3], displacement of the opening jaw.
     """
     front = body[(np.abs(positions[body, 0]) < 0.4) & (positions[body, 2] > 1.2)]
     joined: dict[int, set[int]] = {}
@@ -150,12 +150,12 @@ def _lip_line(positions: Floats, faces: list[list[int]], body: Ints, jaw_open: F
 
 
 def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
-    """float64[V]: how much a vertex goes with a lid, both eyes; lashes go with the skin below.
+    """Weight of a lid of both eyes, float64[V]; lashes get the weight of the skin below.
 
     Args:
         positions: float64[V, 3], decimetres.
         groups: vertex indices by group of the base mesh.
-        number: of its group of lashes.
+        number: number of its lash group.
     """
     out = np.zeros(len(positions))
     body = groups["body"]
@@ -165,7 +165,7 @@ def _lid(positions: Floats, groups: dict[str, Ints], number: int) -> Floats:
         roots = positions[lashes[height < np.quantile(height, 0.35)]]
         index, distance = nearest(positions[body], roots)
         weight = 1 - smooth_step(distance / _LID)
-        # The other lid is as near at the corners: what lies on its side of the roots stays.
+        # At the corners the other lid is as near: keep only the skin on this side of the roots.
         beyond = (positions[body, 1] - roots[index, 1]) * (1 if number == 2 else -1)
         weight *= smooth_step((beyond + 0.004) / 0.006)
         width = np.abs(roots[:, 0] - roots[:, 0].mean()).max()

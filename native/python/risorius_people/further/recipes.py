@@ -22,7 +22,7 @@ _OF_DATA = {"data", "units", "size", "with"}
 
 
 def names_of(row: str) -> list[str]:
-    """The raw controls of a row: itself, or one for each side."""
+    """The raw controls of a row: its name, or one name per side."""
     return [row.replace(_SIDE, side) for side in "LR"] if _SIDE in row else [row]
 
 
@@ -32,12 +32,12 @@ CONTROLS_OF_CODE = [
 
 
 def unit_shape(source: Source, origin: Mapping[str, float], name: str, count: int) -> Floats:
-    """Displacement [V, 3] of a FACS-like unit of the data, mixed of its origins, decimetres.
+    """Displacement [V, 3] of a FACS-like unit, mixed from the data's origins, decimetres.
 
     Args:
-        source: has it.
-        origin: shares of the data's origins, together 1.
-        name: of the unit.
+        source: the data with the unit.
+        origin: share of each origin of the data, with sum 1.
+        name: name of the unit.
         count: V.
     """
     folder = f"{TARGETS}expression/units"
@@ -55,14 +55,14 @@ def further_units(
     units: Mapping[str, Floats],
     sides: Mapping[str, Floats],
 ) -> tuple[dict[str, Floats], dict[tuple[str, str], Floats]]:
-    """float64[V, 3] by raw control, and of correctives by the two that they fire with, decimetres.
+    """Displacements float64[V, 3] by raw control, and correctives by two raw controls, decimetres.
 
     Args:
-        source: has the data's shapes.
-        origin: shares of the data's origins, together 1.
-        places: of the face that they are made on.
-        units: float64[V, 3] of the raw controls that there are already.
-        sides: float64[V] by "L" and "R", together 1.
+        source: the data with the shapes.
+        origin: share of each origin of the data, with sum 1.
+        places: the places of the face.
+        units: float64[V, 3] of the existing raw controls.
+        sides: float64[V] by "L" and "R", with sum 1.
     """
     out, correctives = {}, {}
     for row, keys in _ROWS.items():
@@ -92,7 +92,7 @@ def _ways(
     units: Mapping[str, Floats],
     keys: Mapping[str, Any],
 ) -> Floats:
-    """float64[V, 3]: where a row leads, before it is held to a place."""
+    """Displacement of a row before its weights, float64[V, 3]."""
     count = len(places.positions)
     out = np.zeros((count, 3))
     for name, weight in keys.get("data", {}).items():
@@ -117,7 +117,7 @@ def _ways(
 
 
 def _weight(places: Places, keys: Mapping[str, Any]) -> Floats:
-    """float64[V]: how much of a row's motion is wanted where."""
+    """Weights of a row's motion, float64[V]."""
     out = np.ones(len(places.positions))
     if "lip" in keys:
         out *= places.lips[keys["lip"]]

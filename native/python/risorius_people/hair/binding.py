@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Cards as meshes of a Dna: each vertex has the weights and shapes of the skin that it stands on.
+"""Cards as meshes of a Dna: each vertex gets the weights and shapes of the skin below it.
 
-They join a face when it is done: what moves the skin moves its hair as well, whatever the skin was
-fitted with, and the fit has none of them to do.
+Cards are bound to the finished face. So the hair moves with the skin of any rig, and the fit has no
+hair to handle.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from .strips import unit as unit_vectors
 from .surface import Roots, about, nearest_places, nearest_rows
 
 _LEAST_WEIGHT = 0.01
-ARM = 0.8  # centimetres of a hair that turn with the skin; what is longer hangs
+ARM = 0.8  # centimetres of a hair that turn with the skin; the rest hangs
 _MOST_INFLUENCES = 8
 _PARTING = tuple(f"CTRL_expressions.{name}" for name in ("jawOpen", "eyeBlinkL", "eyeBlinkR"))
 
 
 def head_of(dna: Dna, lod: int) -> Mesh | None:
-    """The head's mesh of a level, if it has one.
+    """The head mesh of a LOD, or None.
 
     Args:
         dna: a sample face.
-        lod: the level.
+        lod: the LOD.
     """
     for m in (int(i) for i in dna.lod_mesh_mapping[lod]):
         if re.match(r"head_lod\d+_mesh$", dna.mesh_names[m]):
@@ -39,7 +39,7 @@ def head_of(dna: Dna, lod: int) -> Mesh | None:
 
 
 def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
-    """int64[T, 3], triangles by vertex, and int64[V, n], those about each vertex."""
+    """Triangles by vertex, int64[T, 3], and the triangles about each vertex, int64[V, n]."""
     offsets = np.asarray(mesh.face_offsets, np.int64)
     layouts = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
     sizes = np.diff(offsets)
@@ -52,9 +52,10 @@ def corners_of(mesh: Mesh) -> tuple[Ints, Ints]:
 
 
 def whereabouts(dna: Dna, head: Mesh) -> Floats:
-    """float64[V, 12]: where vertices are at rest, with an open jaw and with either eye closed.
+    """Positions at rest, with an open jaw and with either eye closed, float64[V, 12].
 
-    What touches at rest, as lips and lids do, is far apart in it.
+    Lips and lids touch at rest; in these poses they are far apart, so nearest points stay on one
+    side.
 
     Args:
         dna: has the controls.
@@ -73,13 +74,13 @@ def whereabouts(dna: Dna, head: Mesh) -> Floats:
 
 
 def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Floats) -> Roots:
-    """The place of the skin that each vertex of the cards moves with.
+    """The place on the skin that each vertex of the cards follows.
 
     Args:
         head: the head.
         strips: the cards.
-        unit: of the mesh, in theirs.
-        own: float64[n, 12], whereabouts of the roots; None: the head is the one that they are on.
+        unit: unit of the mesh, in units of the cards.
+        own: float64[n, 12], whereabouts of the roots; None: the cards are rooted on this head.
         there: float64[V, 12], whereabouts of the head's vertices.
     """
     positions = np.asarray(head.positions, np.float64) / unit
@@ -102,11 +103,11 @@ def holds(head: Mesh, strips: Strips, unit: float, own: Floats | None, there: Fl
 
 
 def card_mesh(strips: Strips, unit: float) -> Mesh:
-    """The cards without skin and shapes.
+    """The cards as a mesh without skin weights and blend shapes.
 
     Args:
         strips: the cards, decimetres.
-        unit: of the mesh, in theirs.
+        unit: unit of the mesh, in units of the cards.
     """
     positions, normals = card_vertices(strips)
     faces, uvs = card_faces(strips)
@@ -114,10 +115,11 @@ def card_mesh(strips: Strips, unit: float) -> Mesh:
 
 
 class Turning:
-    """How far a shape of the skin turns what stands off from it.
+    """Turns the cards where a blend shape tilts the skin.
 
-    What a joint moves turns with it; a shape only shifts, and a beard that is shifted with a lip
-    that rolls in stands in the skin beside it. Args of the constructor: as of bind.
+    A joint turns the cards itself. A blend shape only shifts their roots: without this turn a beard
+    on a lip that rolls in would stand in the skin beside it. The arguments of the constructor are
+    as in bind.
     """
 
     def __init__(self, head: Mesh, places: Roots, mesh: Mesh) -> None:
@@ -136,30 +138,30 @@ class Turning:
         self._normals = self._normals_at(self._skin)
 
     def _normals_at(self, skin: Floats) -> Floats:
-        """float64[n, 3], unit: of the skin, where the places are."""
+        """Unit normals of the skin at the places, float64[n, 3]."""
         a, b, c = (skin[self._triangles[:, k]] for k in range(3))
         faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
         sums = [np.bincount(self._rows, faces[:, k], self._count + 1) for k in range(3)]
         return unit_vectors(self._places.of(unit_vectors(np.stack(sums, axis=1)[:-1])))
 
     def of(self, delta: Floats) -> Floats:
-        """float64[n, 3], what a shape moves the cards beyond what it shifts their places.
+        """Displacement of the cards by their turn, beyond the shift of their places, float64[n, 3].
 
         Args:
-            delta: float64[V, 3] of the skin.
+            delta: float64[V, 3], the shape's deltas of the skin.
         """
         return turned(self._off, self._normals, self._normals_at(self._skin + delta))
 
 
 def turned(off: Floats, was: Floats, now: Floats) -> Floats:
-    """float64[..., 3]: how far ends move that turn with a normal.
+    """Displacement of ends that turn with a normal, float64[..., 3].
 
     Args:
-        off: float64[..., 3], from where the normal stands to each end.
-        was, now: float64[..., 3], unit: the normal.
+        off: float64[..., 3], from the foot of the normal to each end.
+        was, now: float64[..., 3], the unit normals before and after.
     """
     axis = np.cross(was, now)
-    # Half around there is no one way to turn.
+    # At 180 degrees the axis is undefined.
     cosine = (was * now).sum(axis=-1, keepdims=True).clip(-0.5)
     across = np.cross(axis, off)
     return np.asarray(across + np.cross(axis, across) / (1 + cosine))
@@ -174,16 +176,16 @@ def bind(
     rigid: bool,
     turns_itself: bool = False,
 ) -> None:
-    """Give cards the skin weights and shapes of the places that they stand on.
+    """Give cards the skin weights and blend shapes of their places on the skin.
 
     Args:
         dna: has the joints.
-        mesh: the cards; gets weights and shapes.
+        mesh: the cards; is changed.
         head: the skin.
-        places: on it, of each vertex of the cards.
-        least: shapes that move none of them further are left out, in the mesh' unit.
-        rigid: what the skin moves less than that hangs on the joint of the head alone.
-        turns_itself: something else turns the cards when a shape turns the skin.
+        places: the place on the skin of each vertex of the cards.
+        least: a shape that moves no vertex further than this is left out, in the unit of the mesh.
+        rigid: places that move less than `least` follow the head joint alone.
+        turns_itself: leave out the turn of the shapes; the caller adds its own.
     """
     weights = places.of(sk.dense_weights(head, len(dna.joint_names)))
     if rigid:
@@ -220,7 +222,8 @@ def bind(
 
 
 def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
-    """bool[n]: which places no control of the face moves further, and no neck carries."""
+    """Places that no control moves further than `least`, and that no neck joint carries,
+    bool[n]."""
     used, rows = np.unique(places.corners, return_inverse=True)
     count = len(dna.raw_control_names)
     motions = sk.column_motions(dna, sk.column_count(dna))[:count]
@@ -239,7 +242,7 @@ def _still(dna: Dna, head: Mesh, places: Roots, least: float) -> Floats:
 
 
 def _apart_from_head(dna: Dna) -> list[int]:
-    """The joints that hang neither on the joint of the head nor are it."""
+    """The joints outside the subtree of the head joint."""
     head, parents = list(dna.joint_names).index("head"), np.asarray(dna.joint_parents, np.int64)
     on_head = np.arange(len(parents)) == head
     for _ in range(len(parents)):
@@ -248,13 +251,13 @@ def _apart_from_head(dna: Dna) -> list[int]:
 
 
 def append_mesh(dna: Dna, name: str, mesh: Mesh, lods: list[int]) -> None:
-    """One more mesh at the end of a Dna.
+    """Append a mesh to a Dna.
 
     Args:
         dna: is changed.
-        name: of the mesh.
-        mesh: finished.
-        lods: the levels that show it.
+        name: name of the mesh.
+        mesh: the finished mesh.
+        lods: the LODs that show it.
     """
     number = len(dna.mesh_names)
     dna.mesh_names = [*dna.mesh_names, name]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Hairs that an expression would bring into the skin are cut shorter, or do not grow.
+"""Cut or drop hairs that expressions would bring into the skin.
 
-A beard hangs on the chin: where a mouth opens wide, what is long under it comes into the throat,
-and what grows at the rim of a lip comes into a lip that rolls in. The finished face says so.
+Long hair under the chin comes into the throat of a wide open mouth. Hair at the rim of a lip comes
+into the lip that rolls in. The finished face is posed to find these hairs.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from .strips import ROOT_DEEP, Strips
 from .strips import unit as unit_vectors
 from .surface import Roots, Surface, about, nearest_places, nearest_rows
 
-_NEAR = 0.3  # decimetres from a hair to the skin that it may come to
-_SOME = 256  # points of all hairs tell where they are
-_LOW = 0.002  # decimetres over the skin that an end keeps, if it was as high at rest
-_DEEPER = 0.002  # than at rest, of a root, which lies in the skin
-_STILL = 0.002  # decimetres: a control that moves the skin less brings no hair into it
-_STIRRED = 0.0005  # a control that moves the skin under a hair less brings none to it
-_SUNK = 0.0015  # of the roughly measured heights: what sinks less is not looked at
-_ROUGHLY = 4  # of so many vertices one
+_NEAR = 0.3  # decimetres: skin further than this from every hair is left out
+_SOME = 256  # number of hair points that decide which skin is near
+_LOW = 0.002  # decimetres: height that an end must keep, unless it was lower at rest
+_DEEPER = 0.002  # decimetres: a root lies in the skin and may sink this much deeper than at rest
+_STILL = 0.002  # decimetres: a control that moves the skin less cannot reach a hair
+_STIRRED = 0.0005  # a control that moves the skin under a hair less leaves this hair alone
+_SUNK = 0.0015  # decimetres of the rough height: a hair that sinks less needs no exact test
+_ROUGHLY = 4  # the rough test uses one in this many vertices
 _SHORTER = 0.75
-_CUTS = 5  # how often a hair is cut before it goes
-_EDGE_DEEP = 0.004  # decimetres, of a card's edge beyond its root
-_AHEAD = 8  # poses that are made before they are asked for
+_CUTS = 5  # cuts before a hair is dropped
+_EDGE_DEEP = 0.004  # decimetres: depth of a card's edge beyond its root
+_AHEAD = 8  # poses that the thread computes in advance
 S = TypeVar("S")
 T = TypeVar("T")
 
 
 def narrow_edges(strips: Strips, surface: Surface) -> None:
-    """Make those narrower whose edge would lie deep in skin that bends: at the root, about an ear.
+    """Narrow the cards whose edges would lie deep in bent skin, as at the root or around an ear.
 
     Args:
         strips: are changed.
-        surface: the head that they grow on.
+        surface: the head that the cards grow on.
     """
     over = np.maximum(0, -_depths(strips.points, surface))
     most = np.where(np.arange(strips.rows) == 0, ROOT_DEEP, _EDGE_DEEP)
@@ -55,7 +55,7 @@ def narrow_edges(strips: Strips, surface: Surface) -> None:
 
 
 def _depths(points: Floats, surface: Surface) -> Floats:
-    """float64[...]: how far below the nearest skin points lie. Args: points  float64[..., 3]."""
+    """Depth of points below the nearest skin, float64[...]. Args: points  float64[..., 3]."""
     flat = points.reshape(-1, 3)
     places = surface.nearest(flat)
     normals = unit_vectors(places.of(surface.normals))
@@ -66,15 +66,15 @@ def _depths(points: Floats, surface: Surface) -> Floats:
 def cut_clear(
     strips: Strips, dna: Dna, head: Mesh, unit: float, faces: Iterable[NDArray[np.float32]]
 ) -> Strips:
-    """The strips without those, and without the ends of those, that skin would go through.
+    """Shorten or drop the strips that would go through the skin, and return the rest.
 
     Args:
-        strips: hair that hangs on its roots, decimetres; is changed.
+        strips: hair bound at its roots alone, decimetres; is changed.
         dna: the finished face.
-        head: its mesh that the hair grows on, of LOD 0.
-        unit: of the mesh, in decimetres.
-        faces: float32[R] each, what raw controls do in an expression. Each control alone is looked
-            at as well, but, there being many, roughly first.
+        head: the head mesh of LOD 0.
+        unit: unit of the mesh, in decimetres.
+        faces: raw controls of each expression, float32[R]. Each control alone is tested too; as
+            there are many, a rough test comes first.
     """
     ground = _Ground(strips, dna, head, unit)
     count = len(dna.raw_control_names)
@@ -101,7 +101,7 @@ def cut_clear(
 
 
 def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
-    """What is found for each row, while a thread is at work on the next ones."""
+    """Results for each row, computed by a thread in advance."""
     waiting: deque[Future[T]] = deque()
     with ThreadPoolExecutor(1) as pool:
         for row in rows:
@@ -113,7 +113,7 @@ def _ahead(work: Callable[[S], T], rows: Iterable[S]) -> Iterator[T]:
 
 
 class _Ground:
-    """The skin about some hairs, and how a face carries both. Args: as of cut_clear."""
+    """The skin near some hairs, and the motion of both by the face. Args: the same as cut_clear."""
 
     def __init__(self, strips: Strips, dna: Dna, head: Mesh, unit: float) -> None:
         self.unit, self._dna, self._rig = unit, dna, Rig(dna)
@@ -145,11 +145,11 @@ class _Ground:
                 )
 
     def roots(self, strips: Strips) -> Roots:
-        """Where they stand, on its vertices."""
+        """The roots of strips on the vertices of this skin."""
         return Roots(self.row[strips.roots.corners], strips.roots.shares)
 
     def normals(self, skin: Floats) -> Floats:
-        """float64[m, 3], unit, of its vertices."""
+        """Unit normals of the vertices, float64[m, 3]."""
         a, b, c = (skin[self.triangles[:, k]] for k in range(3))
         faces = np.repeat(np.cross(b - a, c - a), 3, axis=0)
         rows = self.triangles.ravel()
@@ -157,7 +157,7 @@ class _Ground:
         return unit_vectors(np.stack(sums, axis=1))
 
     def posed(self, raw: NDArray[np.float32]) -> _Posed:
-        """The skin with raw controls."""
+        """The skin posed by raw controls."""
         pose = self._rig.evaluate(raw)
         shaped, shares = self.rest.copy(), np.asarray(pose.blend_shapes).tolist()
         for channel, rows, deltas in self._shapes:
@@ -171,10 +171,10 @@ class _Ground:
 
 
 class _Posed:
-    """Skin that a face has moved.
+    """The skin in a pose.
 
     Attributes:
-        skin: float64[m, 3], decimetres.
+        skin: float64[m, 3], posed positions, decimetres.
     """
 
     def __init__(self, ground: _Ground, shaped: Floats, moves: Floats) -> None:
@@ -191,7 +191,8 @@ class _Posed:
         return self._ground.normals(self._shaped) if is_shaped else self._ground.upright
 
     def _carried(self, strips: Strips) -> Floats:
-        """float64[n, rows, 2, 3]: the left and the right edges, as binding.py has them carried."""
+        """Left and right edges in the pose, float64[n, rows, 2, 3], moved as binding.py moves
+        cards."""
         ground = self._ground
         roots = ground.roots(strips)
         was, now = (unit_vectors(roots.of(n)) for n in (ground.upright, self._turned))
@@ -207,7 +208,8 @@ class _Posed:
         )
 
     def rough(self, strips: Strips) -> Floats:
-        """float64[n, rows]: heights of the guides over the planes of some vertices."""
+        """Heights of the guides over the tangent planes of every fourth vertex, float64[n,
+        rows]."""
         points = self._carried(strips).mean(axis=2).reshape(-1, 3)
         some = slice(None, None, _ROUGHLY)
         near = _nearest(points, self.skin[some])
@@ -215,7 +217,7 @@ class _Posed:
         return np.asarray(height.reshape(strips.points.shape[:2]))
 
     def heights(self, strips: Strips) -> Floats:
-        """float64[n, rows, 2]: of the left and the right edges over the skin."""
+        """Heights of the left and the right edges over the skin, float64[n, rows, 2]."""
         edges = self._carried(strips)
         points, ground = edges.reshape(-1, 3), self._ground
         vertex = _nearest(points, self.skin)
@@ -226,7 +228,7 @@ class _Posed:
 
 
 class _Cutting:
-    """Strips that become shorter, and which of them stay."""
+    """Strips that are being cut, and which of them stay."""
 
     def __init__(self, strips: Strips, still: _Posed) -> None:
         self._strips, self._still = strips, still
@@ -234,7 +236,7 @@ class _Cutting:
         self.stays = np.ones(len(strips), bool)
 
     def cut(self, pose: _Posed, some: Ints) -> None:
-        """Cut those of some that come too near to the skin in a pose."""
+        """Shorten or drop the strips in `some` that come too near to the skin in a pose."""
         strips = self._strips
         for _ in range(_CUTS):
             some = some[_deep(pose.heights(strips.taken(some)), self._rest[some])]
@@ -248,13 +250,13 @@ class _Cutting:
 
 
 def _deep(heights: Floats, rest: Floats) -> NDArray[np.bool_]:
-    """bool[n]: which of some hairs come too near to the skin, and nearer than at rest."""
+    """Which hairs come too near to the skin, and nearer than at rest, bool[n]."""
     lower = heights - np.minimum(rest, _LOW)
     ends, roots = lower[:, 1:].min(axis=(1, 2)), lower[:, 0].min(axis=1)
     return np.asarray((ends < -1e-4) | (roots < -_DEEPER))
 
 
 def _nearest(points: Floats, others: Floats) -> Ints:
-    """As nearest_rows, in half the time: of two that are as near to a micrometre any will do."""
+    """The same as nearest_rows in half the time; float32 blurs distances below a micrometre."""
     middle = others.mean(axis=0)
     return nearest_rows((points - middle).astype(np.float32), (others - middle).astype(np.float32))

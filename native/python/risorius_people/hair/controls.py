@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What lashes do beside the lid that they stand on: controls of their own, and turning with it.
+"""Blend shapes of lashes: their own controls, and the turn with the lid.
 
-A lid slides about the eye. Joints that carry its skin turn less than it does, so lashes get what is
-left of the turn as shapes: on a closed eye they point down.
+A lid slides around the eye, but the joints that carry its skin turn less. The shapes add the
+missing turn, so lashes of a closed eye point down.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from risorius.base.easing import smooth_step
 
 from ..polygons import Floats
 
-# Control -> which half (-1 at the nose), and what a hair's tip does, as shares of its length.
+# Control -> its half of the lid (-1 at the nose), and the shift of a hair's tip in hair lengths.
 _WAYS = {
     "eyelashesUpIN": (-1, (0.0, 1.0, -0.3)),
     "eyelashesUpOUT": (1, (0.0, 1.0, -0.3)),
     "eyelashesDownIN": (-1, (0.0, -1.0, -0.3)),
     "eyelashesDownOUT": (1, (0.0, -1.0, -0.3)),
 }
-_LEAST_TURN = 4.0  # degrees: less is not seen
+_LEAST_TURN = 4.0  # degrees: the eye does not see less
 _LEAST_SHIFT = 1e-3  # centimetres
-_REACH = 0.8  # of its length: how far a tip goes
+_REACH = 0.8  # factor on the tip's shift
 
 
 def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Shapes of the lashes' own controls, where the level has their channels.
+    """Add the shapes of the lashes' own controls, if the LOD has their channels.
 
     Args:
         dna: has the channels.
-        mesh: the lashes' cards, bound; gets the shapes.
-        rows: of a card.
-        lod: the level of the mesh.
+        mesh: the lashes' cards, bound to the skin; gets the shapes.
+        rows: rows of a card.
+        lod: the LOD of the mesh.
     """
     positions = np.asarray(mesh.positions, np.float64)
     middles = _middles(positions, rows)
@@ -51,19 +51,19 @@ def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
         x = np.abs(root[root[:, 0] * side > 0][:, 0])
         aside = (np.abs(root[:, 0]) - (x.min() + x.max()) / 2) / (np.ptp(x) / 2)
         share = smooth_step(0.5 + 0.5 * half * aside) * (root[:, 0] * side > 0)
-        share = share * (middles[:, -1, 1] > root[:, 1])  # upper ones curl up
+        share = share * (middles[:, -1, 1] > root[:, 1])  # upper lashes curl up
         more[channel] = (_REACH * share[:, None] * long)[..., None] * np.array(way)
     _add(mesh, {c: np.repeat(d.reshape(-1, 3), 2, axis=0) for c, d in more.items()})
 
 
 def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Shapes that let lashes turn about their roots as far as the lid goes about the eye.
+    """Add shapes that turn lashes about their roots as much as the lid goes around the eye.
 
     Args:
         dna: has joints of both eyes.
-        mesh: the lashes' cards, bound; gets the shapes.
-        rows: of a card.
-        lod: the level of the mesh.
+        mesh: the lashes' cards, bound to the skin; gets the shapes.
+        rows: rows of a card.
+        lod: the LOD of the mesh.
     """
     channels = _channels(dna, lod)
     positions = np.asarray(mesh.positions, np.float64)
@@ -97,12 +97,12 @@ def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
 
 
 def _middles(positions: Floats, rows: int) -> Floats:
-    """float64[n, rows, 3]: the middle line of each card."""
+    """The middle line of each card, float64[n, rows, 3]."""
     return np.asarray(positions.reshape(-1, rows, 2, 3).mean(axis=2))
 
 
 def _angle(ways: Floats) -> Floats:
-    """float64[n]: how far up each points, radians, seen from the side."""
+    """Elevation of each direction seen from the side, float64[n], radians."""
     return np.asarray(np.arctan2(ways[:, 1], ways[:, 2]))
 
 
@@ -111,14 +111,14 @@ def _wrapped(angles: Floats) -> Floats:
 
 
 def _channels(dna: Dna, lod: int) -> dict[str, int]:
-    """The blend shape channels that a level has, by name."""
+    """The blend shape channels of a LOD, by name."""
     listed = {int(c) for c in dna.lod_blend_shape_mapping[lod]}
     names = enumerate(dna.blend_shape_channel_names)
     return {name: channel for channel, name in names if channel in listed}
 
 
 def _add(mesh: Mesh, more: dict[int, Floats]) -> None:
-    """Add float64[V, 3] by channel to a mesh' shapes."""
+    """Add deltas, float64[V, 3] by channel, to the shapes of a mesh."""
     whole = {channel: delta.copy() for channel, delta in more.items()}
     kept = []
     for target in mesh.blend_shape_targets:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Brows, lashes and beard: which way their hairs lie, and how long they are."""
+"""Directions and lengths of the hairs of brows, lashes and beard."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from .surface import Surface, joined_roots
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
 _BEARD_SPACING = 0.037
-_OVER_LIP = 0.6  # of the spacing and the width of a beard's cards
+_OVER_LIP = 0.6  # factor on spacing and width of the beard's cards
 _LONGEST_OVER_LIP = 0.08  # decimetres
 _RIM = 0.010  # decimetres from the line of the data to the outer rim of the lid
-_LASHES = {"U": (48, 0.098), "D": (26, 0.044)}  # cards of a lid, longest hair in decimetres
+_LASHES = {"U": (48, 0.098), "D": (26, 0.044)}  # cards per lid, longest hair in decimetres
 
 
 def _turned(vectors: Floats, normals: Floats, angles: Floats) -> Floats:
-    """float64[n, 3]: vectors in the skin turned about its normal."""
+    """Vectors rotated about the skin's normals, float64[n, 3]."""
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
     return np.asarray(c * vectors + s * np.cross(normals, vectors))
 
 
 def brow_flow(surface: Surface) -> Floats:
-    """float64[V, 3]: hairs of a brow, upright at the nose, flat at the temple.
+    """Direction of brow hairs, float64[V, 3]: upright at the nose, flat at the temple.
 
-    Those under its middle rise to it, those over it come down, so that they meet in a ridge.
+    Hairs below the middle line rise to it and hairs above come down, so that they meet in a ridge.
 
     Args:
         surface: the head.
@@ -48,19 +48,19 @@ def brow_flow(surface: Surface) -> Floats:
     low = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [64, 56, 42, 26, 8])
     high = np.interp(t, [0.0, 0.12, 0.3, 0.6, 1.0], [56, 34, 2, -16, -14])
     angle = low + (high - low) * smooth_step(0.5 + 0.5 * across)
-    # About the outward normal a turn to the left is up on his left side, down on his right.
+    # A left turn about the outward normal is up on the left side and down on the right.
     return tangent(_turned(arc, surface.normals, np.radians(angle) * side), surface.normals)
 
 
 def brows(surface: Surface, person: Person) -> Strips:
-    """Both brows; all people have their roots at the same places of the skin.
+    """Both brows; all people have their roots at the same places on the skin.
 
     Args:
         surface: the head.
-        person: a child's and a woman's are shorter, an old man's longer.
+        person: brows of children and women are shorter, of old men longer.
     """
     random = np.random.default_rng(21)
-    front = surface.man_normals[:, 2] > 0.1  # not the socket's inside
+    front = surface.man_normals[:, 2] > 0.1  # exclude the inside of the eye socket
     density = brow_density(surface.man, surface.eye) * front
     roots = surface.scattered(density, _BROW_SPACING, random)
     along, _ = brow_place(roots.of(surface.man), surface.eye)
@@ -81,24 +81,25 @@ def brows(surface: Surface, person: Person) -> Strips:
 
 
 def lash_curves(positions: Floats, faces: Ints) -> Floats:
-    """float64[columns, 3]: the line at the lid that the lashes of the data begin at.
+    """The line on the lid where the lashes of the data begin, float64[columns, 3].
 
-    The data's lashes are a grid: its first row lies behind the lid's edge, its second on it.
+    The data's lashes are a grid: its first row lies behind the lid's edge, its second row on it.
 
     Args:
         positions: float64[V, 3] of the person, decimetres.
-        faces: int64[n, 4], of one lid's lashes.
+        faces: int64[n, 4], faces of one lid's lashes.
     """
     grid = _grid(faces)
     rows = positions[grid]
-    if rows[0, :, 2].mean() > rows[-1, :, 2].mean():  # tips are further in front
+    if rows[0, :, 2].mean() > rows[-1, :, 2].mean():  # tips lie further in front
         rows = rows[::-1]
     line = rows[1]
     return np.asarray(line if abs(line[0, 0]) < abs(line[-1, 0]) else line[::-1])
 
 
 def _grid(faces: Ints) -> Ints:
-    """int64[rows, columns]: vertices of a grid of quads, the longer way along the columns."""
+    """Vertices of a grid of quads, int64[rows, columns]; the longer direction runs along the
+    columns."""
     where: dict[int, tuple[int, int]] = {}
     rest = [f.tolist() for f in faces]
     for vertex, place in zip(rest.pop(0), ((0, 0), (1, 0), (1, 1), (0, 1)), strict=True):
@@ -125,12 +126,12 @@ def _grid(faces: Ints) -> Ints:
 
 
 def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips:
-    """Lashes of all four lids: the upper ones long and curled, the lower ones short and sparse.
+    """Lashes of all four lids: upper lashes long and curled, lower lashes short and sparse.
 
     Args:
         surface: the head.
-        lines: float64[n, 3] by "LU", "LD", "RU", "RD": from the nose outward, of lash_curves.
-        person: a woman's and a child's are longer.
+        lines: float64[n, 3] by "LU", "LD", "RU" and "RD": lash_curves from the nose outward.
+        person: lashes of women and children are longer.
     """
     random = np.random.default_rng(22)
     parts = []
@@ -143,7 +144,7 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         at = np.concatenate([[0], np.cumsum(steps)]) / steps.sum()
         begin = np.column_stack([np.interp(t, at, line[:, k]) for k in range(3)])
-        # The outer rim of the lid's edge: what lies behind it folds in where the eye closes.
+        # Root lashes at the outer rim: skin behind it folds in when the eye closes.
         roots = surface.nearest(begin + _RIM * surface.scale * np.array([0.0, 0.0, 1.0]))
         root = roots.of(surface.positions)
         fan = np.interp(t, [0, 0.35, 0.7, 1.0], [-0.55, 0.0, 0.55, 1.05])
@@ -166,7 +167,7 @@ def lashes(surface: Surface, lines: dict[str, Floats], person: Person) -> Strips
 
 
 def _arcs(root: Floats, fan: Floats, length: Floats, first: Floats, last: float) -> Floats:
-    """float64[n, 5, 3]: lashes that leave forward and curl from one height angle to another."""
+    """Lashes that start forward and curl from one elevation to another, float64[n, 5, 3]."""
     flat = unit(np.column_stack([fan, np.zeros(len(fan)), np.ones(len(fan))]))
     points = [root]
     for k in range(4):
@@ -182,7 +183,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     Args:
         surface: the head.
         lips: float64[V], 1 on the lips and in the mouth.
-        person: has a style, not "none".
+        person: beard_style is not "none".
     """
     style = person.beard_style
     random = np.random.default_rng(23)
@@ -190,7 +191,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     density = beard_density(man, lips, style)
     over = _over_lip(man)
     spacing = _BEARD_SPACING * (1.0 if full else 0.8)
-    # Hair over the lip is short and fine, or skin comes through it wherever the mouth goes.
+    # Hair over the lip is short and fine: longer hair would enter the skin when the mouth moves.
     finer = surface.scattered(density * over, _OVER_LIP * spacing, random)
     roots = joined_roots([surface.scattered(density * ~over, spacing, random), finer])
     n = len(roots)
@@ -201,7 +202,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     length = long * (0.55 + 0.75 * under) * random.uniform(0.75, 1.2, n)
     length = np.where(lip, np.minimum(length, _LONGEST_OVER_LIP), length) * surface.scale
     length *= 0.5 + 0.5 * roots.of(density[:, None])[:, 0]
-    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # at the jaw's angle it is trimmed
+    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # trimmed at the jaw's angle
     flow = _beard_flow(man) + 0.22 * random.normal(0, 1, man.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
     rows = 3 if full else 2
@@ -219,12 +220,12 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
 
 
 def _over_lip(man: Floats) -> NDArray[np.bool_]:
-    """bool[V]: where a moustache would be."""
+    """Whether a vertex is in the moustache area, bool[V]."""
     return np.asarray((man[:, 1] > -0.72) & (np.abs(man[:, 0]) < 0.34) & (man[:, 2] > 0.1))
 
 
 def _beard_flow(man: Floats) -> Floats:
-    """float64[V, 3]: down, over the lip aside from the middle of it."""
+    """Direction of beard hairs, float64[V, 3]: down, and sideways over the lip."""
     x, _, z = man.T
     aside = np.where(_over_lip(man), np.sign(x) * (0.25 + 2.2 * np.abs(x)), 0.25 * x)
     return np.column_stack([aside, -np.ones(len(man)), 0.15 * (z < 0.0)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How a hair grows: along a flow over the skin, standing up as far as it is stiff."""
+"""Growth of a hair: it follows a flow over the skin and stands up by its stiffness."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from .strips import unit
 from .surface import Roots, Surface
 
 _SUBSTEPS = 2
-_LOOSE = 0.08  # decimetres over the skin where a hair is drawn back most
-_EASED = 2  # how often
-_FREE = -0.4  # height under which hair hangs freely, of the man
+_LOOSE = 0.08  # decimetres over the skin at which `hug` has its full strength
+_EASED = 2  # smoothing passes
+_FREE = -0.4  # height on the man below which hair hangs freely
 
 
 def grow(
@@ -29,25 +29,25 @@ def grow(
     hug: float = 0.0,
     sway: Floats | float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Guides from roots.
+    """Grow guides from roots.
 
     Args:
         surface: the head.
-        roots: where they begin.
-        flow: float64[V, 3], the way that hair lies at each vertex.
+        roots: the points where the guides begin.
+        flow: float64[V, 3], direction of the hair at each vertex.
         lengths: float64[n], decimetres.
-        rise: float64[n] each, the angle over the skin at the root and at the tip, radians.
+        rise: float64[n] each, the angle above the skin at the root and at the tip, radians.
         rows: points of each guide.
         among: vertices of the surface that a guide may come near.
-        least: float64[n] or a number, height over the skin that a tip has at least, decimetres.
-        stiff: share of the direction so far that each step keeps.
+        least: float64[n] or a number, smallest height of a tip over the skin, decimetres.
+        stiff: share of the previous direction that each step keeps.
         fall: float64[n] or a number, weight of gravity at the tip.
-        hug: how strongly a guide that has left the skin is drawn back to it, above the ears' ends.
-        sway: float64[n, 3], by which each guide's own way differs from the flow, along all of it:
-            noise of the flow itself would bend a card to and fro from vertex to vertex.
+        hug: strength that draws a loose guide back to the skin, above the ends of the ears.
+        sway: float64[n, 3], constant offset of each guide from the flow. Noise in the flow itself
+            would bend a card at every vertex.
 
     Returns:
-        float64[n, rows, 3] each: points, and the way out of the skin there.
+        Points of the guides, and the outward normal of the skin there, float64[n, rows, 3] each.
     """
     at = roots.of(surface.positions)
     out = unit(roots.of(surface.normals))
@@ -78,7 +78,7 @@ def grow(
 
 
 def tangent(vectors: Floats, normals: Floats) -> Floats:
-    """float64[n, 3]: vectors laid into the skin, unit.
+    """Vectors projected into the skin, with unit length, float64[n, 3].
 
     Args:
         vectors: float64[n, 3].
@@ -88,7 +88,7 @@ def tangent(vectors: Floats, normals: Floats) -> Floats:
 
 
 def eased(points: Floats) -> Floats:
-    """float64[n, rows, 3]: guides that do not bend to and fro from row to row; both ends stay.
+    """Guides smoothed along their rows, float64[n, rows, 3]; both ends stay.
 
     Args:
         points: float64[n, rows, 3].
@@ -102,14 +102,14 @@ def eased(points: Floats) -> Floats:
 def curled(
     points: Floats, outside: Floats, radius: Floats, turns: Floats, random: np.random.Generator
 ) -> Floats:
-    """float64[n, rows, 3]: guides wound about themselves, from nothing at the root on.
+    """Guides wound around themselves, from no winding at the root on, float64[n, rows, 3].
 
     Args:
         points: float64[n, rows, 3].
-        outside: float64[n, rows, 3], away from the skin.
-        radius: float64[n], decimetres.
-        turns: float64[n], over the whole length.
-        random: where each begins.
+        outside: float64[n, rows, 3], direction away from the skin.
+        radius: float64[n], radius of the winding, decimetres.
+        turns: float64[n], number of turns over the whole length.
+        random: chooses the start angle of each guide.
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
@@ -117,7 +117,7 @@ def curled(
     t = np.linspace(0, 1, points.shape[1])
     angle = 2 * np.pi * (turns[:, None] * t + random.random((len(points), 1)))
     far = radius[:, None] * np.minimum(3 * t, 1)
-    # Away from the skin alone, or a curl would go through it.
+    # Raise only away from the skin: otherwise a curl would go through it.
     rise = (far * np.sin(angle))[..., None] * up
     inward = np.minimum((rise * outside).sum(axis=2, keepdims=True), 0)
     return np.asarray(points + (far * np.cos(angle))[..., None] * side + rise - inward * outside)

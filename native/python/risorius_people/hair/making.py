@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All hair of a person, and its meshes at the levels that show them."""
+"""All hair of a person, and its meshes for each LOD."""
 
 from __future__ import annotations
 
@@ -29,27 +29,29 @@ from .strips import Strips
 from .surface import Surface
 
 PICTURE = "hair_color.png"
-NO_HAIR = 4  # the level from which on there are no cards
-_SHARES = (1.0, 0.42, 0.2, 0.1)  # of the strips, by level
-_BROWS = (1.0, 0.75, 0.3, 0.1)  # wider, a brow's hairs would be dashes where faces are still large
-_MOST_VERTICES = 12_000  # of all cards at LOD 0
+NO_HAIR = 4  # the first LOD without cards
+_SHARES = (1.0, 0.42, 0.2, 0.1)  # share of the strips at each LOD
+# For brows: wider cards would look like dashes while the face is still large.
+_BROWS = (1.0, 0.75, 0.3, 0.1)
+_MOST_VERTICES = 12_000  # of all cards at LOD 0 together
 _OWN = ("hair", "beard")
 _ROWS = (99, 4, 3, 3)
 _LEAST_MM = {"hair": 1.0, "brows": 0.15, "beard": 0.15, "eyelashes": 0.1}
-_MM = 10.0  # of a centimetre
-_OVERDONE = np.float32(1.4)  # times an expression, each control at most 1
-_WIDEST, _OVER = "smile_open", np.float32(0.5)  # what brings most of a beard to where skin folds
-_COIL = 1.6  # mm: radius of the coils of an afro of four centimetres
-_PITCH = 2.4  # of a coil's radius, from turn to turn, where hair winds most tightly
+_MM = 10.0  # millimetres in a centimetre
+_OVERDONE = np.float32(1.4)  # factor on an expression; each control stays at most 1
+# The expression that brings most of a beard to folds of the skin, and its weight.
+_WIDEST, _OVER = "smile_open", np.float32(0.5)
+_COIL = 1.6  # mm: coil radius of an afro 4 cm long
+_PITCH = 2.4  # distance between turns in coil radii, where hair winds most tightly
 
 
 @dataclass
 class Grown:
-    """The hair of a person by mesh: hair, brows, beard, eyelashes; what there is none of is not
-    in it."""
+    """The hair of a person by mesh (hair, brows, beard, eyelashes), without meshes that the person
+    lacks."""
 
     strips: dict[str, Strips]
-    unit: float  # of the Dna's meshes, in decimetres
+    unit: float  # unit of the Dna's meshes, in decimetres
 
 
 def grow_hair(
@@ -59,11 +61,11 @@ def grow_hair(
 
     Args:
         person: has the styles.
-        body: the person's.
-        even: float64[V, 3], the man's positions with both sides alike, decimetres.
+        body: the person's body.
+        even: float64[V, 3], positions of the man without asymmetry, decimetres.
         base: the base mesh.
-        parts: the meshes; the head of LOD 0 is grown on.
-        unit: of the Dna's meshes, in decimetres.
+        parts: the meshes; hair grows on the head of LOD 0.
+        unit: unit of the Dna's meshes, in decimetres.
     """
     head = next(p for p in parts if p.name == "head_lod0_mesh")
     eye = even[body.groups["helper-l-eye"]].mean(axis=0)
@@ -93,24 +95,24 @@ def _beard(surface: Surface, head: Part, person: Person) -> Strips:
 
 
 def _within_budget(strips: dict[str, Strips]) -> dict[str, Strips]:
-    """Fewer and wider cards on the scalp where all together have too many vertices."""
+    """Replace the scalp's cards by fewer and wider ones if all cards have too many vertices."""
     counts = {name: 2 * len(s) * s.rows for name, s in strips.items()}
     over = sum(counts.values()) - _MOST_VERTICES
     if over > 0 and "hair" in strips:
-        over += 2 * strips["hair"].rows  # the count of strips is rounded
+        over += 2 * strips["hair"].rows  # coarser rounds the number of strips
         share = max(0.2, 1 - over / counts["hair"])
         strips = strips | {"hair": strips["hair"].coarser(share, strips["hair"].rows)}
     return strips
 
 
 def add_hair(dna: Dna, grown: Grown) -> None:
-    """Add the cards of all levels to a finished face.
+    """Add the cards of all LODs to a finished face.
 
     Args:
         dna: the face; gets the meshes.
-        grown: the hair; of a beard goes what skin would come through.
+        grown: the hair; beard hairs that the skin would hit are cut or dropped.
     """
-    # What each person has otherwise comes last, so that all others keep their numbers in a mix.
+    # Meshes that differ between people come last: the others keep their numbers in a mix.
     names = sorted(grown.strips, key=lambda name: name in _OWN)
     heads = {lod: head_of(dna, lod) for lod in range(min(dna.lod_count, NO_HAIR))}
     there = {lod: whereabouts(dna, head) for lod, head in heads.items() if head is not None}
@@ -136,10 +138,10 @@ def add_hair(dna: Dna, grown: Grown) -> None:
 
 
 def _played(names: list[str]) -> list[NDArray[np.float32]]:
-    """What raw controls do in each expression, alone and with another over it, which is more.
+    """Raw controls of each expression: alone, overdone, and with a smile added.
 
     Args:
-        names: of the raw controls.
+        names: names of the raw controls.
     """
     alone = [pose_vector(face, names) for face in load().values()]
     smile = _OVER * pose_vector(_WIDEST, names)
@@ -148,26 +150,26 @@ def _played(names: list[str]) -> list[NDArray[np.float32]]:
 
 
 def hair_picture(person: Person, largest: int) -> dict[str, bytes]:
-    """The picture of the hairs by its file name, as PNG.
+    """The texture of the hairs as PNG, by file name.
 
     Args:
         person: has the colours.
-        largest: it has no more texels than a square of this side.
+        largest: each texture has at most largest * largest texels.
     """
     return {PICTURE: png(shrunk(paint_strands(person), largest))}
 
 
 def hair_metadata(dna: Dna, grown: Grown, person: Person) -> dict[str, str]:
-    """Which meshes show the picture of the hairs, and how.
+    """Metadata: which meshes show the hair texture, and the layout of their cards.
 
-    `texture:<mesh>:color` -> file name; `hair:<mesh>` -> "rows=R" of its cards, which stand one
-    after the other, two vertices in a row, from root to tip: renderers of strands follow them;
-    `coil:<mesh>` -> "radius=R pitch=P", millimetres, where strands wind about their way.
+    `texture:<mesh>:color` -> file name. `hair:<mesh>` -> "rows=R": the cards follow one another,
+    each with R rows of two vertices from root to tip; strand renderers need it. `coil:<mesh>` ->
+    "radius=R pitch=P" in millimetres, if strands wind about their path.
 
     Args:
         dna: has the meshes.
         grown: the hair.
-        person: has the curls.
+        person: has the hair curl and length.
     """
     metadata = {}
     for name in dna.mesh_names:

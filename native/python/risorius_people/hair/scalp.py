@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Hair of the scalp by style: short crops, receding, a bun, long hair, tight curls."""
+"""Scalp hair by style: short crops, receding, a bun, long hair, tight curls."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from .growth import curled, eased, grow, tangent
 from .strips import ROOT_DEEP, Strips, joined, make_strips, unit
 from .surface import Roots, Surface
 
-_WHORL = np.array([0.10, 0.86, -1.40])  # where hair turns about the crown, of the man
-_PARTING = 0.10  # how far to his left hair is parted
+# Place on the man's head around which hair turns at the crown.
+_WHORL = np.array([0.10, 0.86, -1.40])
+_PARTING = 0.10  # distance of the parting to his left
 _THIN = TILES["scalp"][4] - DENSE
-_LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights at which a fringe ends, of the man
-_FINE = 0.75  # spacing of short hair where it begins over the forehead, of that elsewhere
-_CLOSE = 0.6  # hair_length of an afro that is so short that it lies on the head
+_LINE_OF_BROWS, _HIGH_ON_FOREHEAD = 0.27, 0.62  # heights on the man's head at which a fringe ends
+_FINE = 0.75  # factor on the spacing of short hair at its edge over the forehead
+_CLOSE = 0.6  # an afro with a smaller hair_length lies on the head
 
 
 def whorl_flow(surface: Surface, side: float) -> Floats:
-    """float64[V, 3]: hair from the whorl of the crown outward, turning where it begins.
+    """Direction of hair from the whorl at the crown outward, float64[V, 3]; it turns near the
+    whorl.
 
     Args:
         surface: the head.
-        side: how far the hair over the forehead is combed to his right, 0 to 1.
+        side: how far the hair over the forehead is combed to the character's right, 0 to 1.
     """
     man, normals = surface.man, surface.man_normals
     away = tangent(man - _WHORL, normals)
@@ -51,22 +53,23 @@ def _roots(
     even: bool = True,
     fine: float = 0.0,
 ) -> tuple[Roots, Floats]:
-    """Roots inside of an uneven hairline, and how far inside each is, decimetres of the man.
+    """Roots inside an uneven hairline, and their distances inside it, decimetres on the man.
 
-    Those of short hair are not even: it lies flat at the sides and stands up on top. Those of
-    long hair are finer at the edge, and with `fine` 1 also at a parting.
+    Short hair is denser where it lies flat, and thinner where it stands up. Long hair is finer at
+    the edge, and with `fine` 1 also at a parting.
     """
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[style])
     inside = inside + 0.014 * wavy(man, random, 3.0) + 0.005 * wavy(man, random, 9.0)
-    if even:  # no line: single hairs stand before it, and the corners over the temples are round
+    # No sharp line: single hairs stand before it, and the corners over the temples are round.
+    if even:
         inside = inside + 0.016 * wavy(man, random, 1.6)
     density = smooth_step((inside + 0.03) / 0.11 if even else inside / 0.07)
     density = density * (1 - thinned(man, style))
     if not even:
         density = density * (1 - 0.5 * smooth_step((man[:, 1] - 0.4) / 0.3))
         density = density * (1 - 0.3 * smooth_step((inside - 0.08) / 0.1))
-        # Over the forehead one sees single cards: there they stand closer, and are narrower.
+        # Over the forehead single cards are visible, so they stand closer and are narrower.
         edge = np.exp(-((inside / 0.09) ** 2)) * smooth_step((man[:, 2] + 0.8) / 0.4)
         density = density * (_FINE**2 + (1 - _FINE**2) * edge)
     if fine:
@@ -81,7 +84,7 @@ def _roots(
 
 
 def _tiles(inside: Floats, random: np.random.Generator, edge: float = 0.07) -> Floats:
-    """Thin tiles at the hairline and here and there, dense ones elsewhere."""
+    """Thin tiles at the hairline and at random places, dense tiles elsewhere."""
     n = len(inside)
     thin = (inside < edge * random.uniform(0.4, 1.3, n)) | (random.random(n) < 0.12)
     numbers = np.where(thin, DENSE + random.integers(0, _THIN, n), random.integers(0, DENSE, n))
@@ -98,17 +101,17 @@ def crop(surface: Surface, person: Person) -> Strips:
 
     Args:
         surface: the head.
-        person: `hair_length` is a share of the usual.
+        person: `hair_length` is a factor on the usual length.
     """
     return _short(surface, person, 31, "crop", top=0.32, sides=0.22)
 
 
 def receding(surface: Surface, person: Person) -> Strips:
-    """An old man's: gone back over the temples, thin on top, combed back.
+    """Hair of an old man: receded over the temples, thin on top, combed back.
 
     Args:
         surface: the head.
-        person: `hair_length` is a share of the usual.
+        person: `hair_length` is a factor on the usual length.
     """
     return _short(surface, person, 32, "receding", top=0.30, sides=0.20)
 
@@ -125,7 +128,7 @@ def _short(
     high = smooth_step((man[:, 1] - 0.30) / 0.40)
     fore = smooth_step((man[:, 2] + 0.5) / 0.6) * high
     length = sides + (top - sides) * high + 0.16 * fore
-    edge = 0.5 + 0.2 * fore * (recession == 0)  # hair over the forehead hides where it begins
+    edge = 0.5 + 0.2 * fore * (recession == 0)  # hair over the forehead hides the hairline
     length *= edge + (1 - edge) * smooth_step(inside / 0.2)
     nape = smooth_step((-0.25 - man[:, 1]) / 0.3)
     length *= (1 - 0.45 * nape) * person.hair_length * surface.scale * random.uniform(0.75, 1.2, n)
@@ -145,7 +148,7 @@ def _short(
     half = (0.024 + 0.026 * high) * surface.scale * (spacing / 0.043) * random.uniform(0.8, 1.25, n)
     half *= 0.5 + 0.5 * smooth_step(inside / 0.14)
     turns = np.radians(random.uniform(-1, 1, n) * (6 + 20 * high))
-    # Short hair is low along all of its length.
+    # Short hair stays low along its whole length.
     steep = np.arcsin(np.clip(ROOT_DEEP * surface.scale / half, 0, 1))
     turns = np.clip(turns, -steep, steep)
     taper = np.array([0.85, 0.97, 1.0, 0.91, 0.7])
@@ -153,11 +156,11 @@ def _short(
 
 
 def afro(surface: Surface, person: Person) -> Strips:
-    """Tight curls that stand away from the head on all sides; short ones lie on it.
+    """Tight curls that stand away from the head; short ones lie on it.
 
     Args:
         surface: the head.
-        person: `hair_length` is a share of four centimetres.
+        person: `hair_length` is a factor on 4 cm.
     """
     random = np.random.default_rng(33)
     short = person.hair_length < _CLOSE
@@ -167,7 +170,7 @@ def afro(surface: Surface, person: Person) -> Strips:
     length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
-    # Of a card that stands upright one sees the edge, where too little hair hides it.
+    # An upright card shows its edge, so cards near the hairline, with little hair around, lie flat.
     upright = np.zeros(n) if short else smooth_step((inside - 0.03) / 0.15)
 
     def between(lying: tuple[float, float], standing: tuple[float, float]) -> Floats:
@@ -189,17 +192,17 @@ def afro(surface: Surface, person: Person) -> Strips:
     turns = between((-16, 16), (0, 180))
     taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
     strips = make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
-    # Over the forehead a frown moves the skin: what stands deep in it there would go deeper.
+    # A frown moves the skin of the forehead: narrow cards there, so that edges do not sink deeper.
     strips.sides[:, 0] *= (0.5 + 0.5 * smooth_step(inside / 0.15))[:, None]
     return strips
 
 
 def long(surface: Surface, person: Person) -> Strips:
-    """Hair to the shoulders, parted beside the middle, behind the face.
+    """Hair to the shoulders behind the face, parted beside the middle.
 
     Args:
         surface: the head.
-        person: `hair_length` is a share of the usual.
+        person: `hair_length` is a factor on the usual length.
     """
     random = np.random.default_rng(34)
     roots, inside = _roots(surface, 0.066, random, "long", fine=1.0)
@@ -207,13 +210,14 @@ def long(surface: Surface, person: Person) -> Strips:
     man = roots.of(surface.man)
     flow = parted_flow(surface)
     sway = 0.10 * random.normal(0, 1, (n, 3))
-    # Each hair ends at about the same height: what begins higher is longer.
+    # Hairs end at about the same height: hairs with higher roots are longer.
     way = 0.85 * (man[:, 1] + 0.55) + 1.15
     length = np.clip(way, 1.0, 2.6) * person.hair_length * surface.scale
     length *= random.uniform(0.88, 1.08, n)
     rise = np.radians(random.uniform(6, 14, n)), np.zeros(n)
     above = np.flatnonzero(surface.man[:, 1] > -1.9)
-    least = (0.036 + 0.02 * random.random(n)) * surface.scale  # an ear that is raised stays under
+    # Hair must stay above an ear that is raised.
+    least = (0.036 + 0.02 * random.random(n)) * surface.scale
     points, out = grow(surface, roots, flow, length, rise, 9, above, least, 0.5, 0.55, 1.2, sway)
     wave = 0.05 * (0.25 + person.hair_curl) * random.uniform(0.5, 1.2, n)
     points = curled(points, out, wave, random.uniform(0.5, 1.6, n), random)
@@ -230,7 +234,7 @@ def long(surface: Surface, person: Person) -> Strips:
 
 
 def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
-    """Hair from behind the hairline that falls over the forehead, straight and even at its end."""
+    """Hair from behind the hairline that falls over the forehead and ends in a straight line."""
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[person.hair_style])
     x, y, z = man.T
@@ -243,7 +247,7 @@ def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Gener
     length = 1.1 * surface.scale * random.uniform(0.9, 1.1, n)
     rise = np.radians(random.uniform(14, 26, n)), np.zeros(n)
     near = np.flatnonzero((y > -0.3) & (z > -1.5))
-    # The skin of the forehead comes and goes under it.
+    # The skin of the forehead moves below the fringe, so keep a gap.
     least = (0.025 + 0.03 * random.random(n)) * surface.scale
     sway = 0.07 * random.normal(0, 1, (n, 3))
     points, out = grow(surface, roots, flow, length, rise, rows, near, least, 0.4, 0.3, 1.0, sway)
@@ -259,20 +263,20 @@ def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Gener
 def _ended(
     surface: Surface, points: Floats, out: Floats, end: Floats, near: Ints
 ) -> tuple[Floats, Floats]:
-    """Guides that end where they come down to a height of the head, as many points in each.
+    """Guides cut where they come down to a height of the head; each keeps its number of points.
 
     Args:
         surface: the head.
-        points, out: float64[n, rows, 3] each, of grow.
-        end: float64[n], heights of the man.
-        near: vertices of the surface that they may come near.
+        points, out: float64[n, rows, 3] each, from grow.
+        end: float64[n], heights on the man.
+        near: vertices of the surface that the guides may come near.
     """
     n, rows, _ = points.shape
     _, _, vertex = surface.below(points.reshape(-1, 3), near)
     height = surface.man[vertex, 1].reshape(n, rows)
     k = np.arange(rows)
     for guide in range(n):
-        # What turns up again at its tip would be met from its other side.
+        # Ignore a tip that turns up again: it would cross the height a second time.
         down = np.minimum.accumulate(height[guide])
         last = float(np.interp(-end[guide], -down, k))
         at = np.linspace(0, max(last, 0.5), rows)
@@ -282,7 +286,8 @@ def _ended(
 
 
 def parted_flow(surface: Surface) -> Floats:
-    """float64[V, 3]: hair that falls to both sides of a parting and back behind the ears.
+    """Direction of hair that falls to both sides of a parting and back behind the ears, float64[V,
+    3].
 
     Args:
         surface: the head.
@@ -295,7 +300,7 @@ def parted_flow(surface: Surface) -> Floats:
     fore = smooth_step((z + 0.5) / 0.5) * top
     flow[:, 1] += 0.4 * fore
     flow[:, 2] -= 0.55 * fore
-    # Before and above the ears it goes back, under them it falls.
+    # Hair in front of and above the ears goes back; below the ears it falls.
     before = smooth_step((z + 0.95) / 0.3) * smooth_step((y + 0.35) / 0.25) * (1 - top)
     flow[:, 2] -= 0.9 * before
     low = smooth_step((-0.35 - y) / 0.25)[:, None]
@@ -303,15 +308,15 @@ def parted_flow(surface: Surface) -> Floats:
     return tangent(flow, surface.normals)
 
 
-_KNOT = np.array([0.0, 0.46, -1.72])  # where a bun sits, of the man
+_KNOT = np.array([0.0, 0.46, -1.72])  # place of the bun on the man
 
 
 def bun(surface: Surface, person: Person) -> Strips:
-    """Hair drawn back to a knot.
+    """Hair drawn back into a bun.
 
     Args:
         surface: the head.
-        person: `hair_length` is a share of the knot's size.
+        person: `hair_length` is a factor on the bun's size.
     """
     random = np.random.default_rng(35)
     roots, inside = _roots(surface, 0.060, random, "bun", fine=0.01)
@@ -323,7 +328,7 @@ def bun(surface: Surface, person: Person) -> Strips:
     sway = 0.05 * random.normal(0, 1, (n, 3))
     length = 1.12 * np.linalg.norm(man - _KNOT, axis=1) * surface.scale
     length = np.minimum(length, 1.5 * surface.scale) * random.uniform(0.9, 1.0, n)
-    full = smooth_step(man[:, 1] / 0.4)  # not tight over forehead and temples
+    full = smooth_step(man[:, 1] / 0.4)  # loose over forehead and temples
     rise = np.radians(random.uniform(3, 9, n) + 9 * full), np.zeros(n)
     above = _scalp_vertices(surface)
     least = (0.004 + 0.035 * full + (0.014 + 0.02 * full) * random.random(n)) * surface.scale
@@ -343,7 +348,7 @@ def bun(surface: Surface, person: Person) -> Strips:
 def _knot(
     root: Roots, middle: Floats, axis: Floats, size: float, random: np.random.Generator
 ) -> Strips:
-    """Strips wound about an axis into a ball, those inside of it opaque."""
+    """Strips wound about an axis into a ball; the inner strips are opaque."""
     count, rows = 64, 6
     across = unit(np.cross(axis, [1.0, 0.0, 0.0]))
     other = np.cross(axis, across)

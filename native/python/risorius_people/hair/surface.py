@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The skin that hair grows on: places on its triangles, carried from the man to any person."""
+"""The skin on which hair grows: places on its triangles, carried from the man to each person."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from risorius.author.geometry.polygon_mesh import vertex_normals
 from ..polygons import Floats, Ints, Polygons
 
 _CHUNK = 256
-_AT_ONCE = 64  # points whose distances to all others stay in the processor's cache
+_AT_ONCE = 64  # points per block: their distances to all others fit into the processor's cache
 
 
 @dataclass
@@ -19,48 +19,48 @@ class Roots:
     """Places on a mesh.
 
     Attributes:
-        corners: int64[n, 3], vertices of the triangle of each.
-        shares: float64[n, 3], of the corners; rows sum to 1.
+        corners: int64[n, 3], vertices of the triangle of each place.
+        shares: float64[n, 3], weights of the corners; rows sum to 1.
     """
 
     corners: Ints
     shares: Floats
 
     def of(self, values: Floats) -> Floats:
-        """float64[n, k]: what vertices have, float64[V, k], at the places."""
+        """Values of vertices, float64[V, k], at the places, float64[n, k]."""
         return np.asarray(np.einsum("nc,nck->nk", self.shares, values[self.corners]))
 
     def __len__(self) -> int:
         return len(self.corners)
 
     def taken(self, rows: Ints) -> Roots:
-        """Some of them, by number or mask."""
+        """The chosen places, by index or mask."""
         return Roots(self.corners[rows], self.shares[rows])
 
 
 def joined_roots(parts: list[Roots]) -> Roots:
-    """Those of all parts, one after the other."""
+    """The places of all parts, one part after the other."""
     return Roots(
         np.concatenate([p.corners for p in parts]), np.concatenate([p.shares for p in parts])
     )
 
 
 class Surface:
-    """A head: its form as that of a person, and where each vertex is on the man.
+    """The head of a person, and the place of each vertex on the man's head.
 
     Attributes:
         positions: float64[V, 3] of the person, decimetres.
         normals: float64[V, 3], unit.
-        man: float64[V, 3], the man's positions relative to the middle of his eyes, which
-            all maps of hair are drawn in; x of both sides.
-        scale: the person's size, 1 that of the man.
+        man: float64[V, 3], the man's positions; all maps of hair are drawn in them. y and z are
+            relative to the middle of his left eye, x to the middle of the face.
+        scale: size of the person, 1 for the man.
     """
 
     def __init__(self, polygons: Polygons, positions: Floats, man: Floats, eye: Floats) -> None:
-        """Reads the mesh.
+        """Read the mesh.
 
         Args:
-            polygons: of the head.
+            polygons: polygons of the head.
             positions: float64[V, 3] of the person, decimetres.
             man: float64[V, 3] of the man.
             eye: float64[3], the middle of the man's left eye.
@@ -77,12 +77,12 @@ class Surface:
         self._around = about(self.triangles, len(positions))
 
     def scattered(self, density: Floats, spacing: float, random: np.random.Generator) -> Roots:
-        """Places no nearer to each other than the spacing over the root of the density.
+        """Random places; their smallest distance is the spacing over the root of the density.
 
         Args:
-            density: float64[V], 0 to 1; where it is 0 there is none.
+            density: float64[V], 0 to 1; 0: no places.
             spacing: decimetres on the man, where the density is 1.
-            random: chooses them.
+            random: source of the places.
         """
         rows = self.triangles[density[self.triangles].max(axis=1) > 0]
         a, b, c = (self.man[rows[:, k]] for k in range(3))
@@ -96,19 +96,19 @@ class Surface:
         return roots.taken(_apart(roots.of(self.man), thick, spacing))
 
     def nearest(self, points: Floats) -> Roots:
-        """The place of the skin that is nearest to each point.
+        """The place on the skin nearest to each point.
 
         Args:
-            points: float64[n, 3], in the person's space.
+            points: float64[n, 3], on the person.
         """
         return nearest_places(self.positions, self.triangles, self._around, points)
 
     def below(self, points: Floats, among: Ints) -> tuple[Floats, Floats, Ints]:
-        """Height over the skin, the normal there, and the nearest vertex, roughly and quickly.
+        """Height over the skin, the normal there, and the nearest vertex; fast and approximate.
 
         Args:
             points: float64[n, 3].
-            among: the vertices that are looked at.
+            among: the vertices to search.
         """
         vertex = among[nearest_rows(points, self.positions[among])]
         height = ((points - self.positions[vertex]) * self.normals[vertex]).sum(axis=1)
@@ -116,11 +116,11 @@ class Surface:
 
 
 def about(triangles: Ints, count: int) -> Ints:
-    """int64[count, n]: triangles about each vertex, the last one again where there are fewer.
+    """Triangles about each vertex, int64[count, n]; short rows repeat their last triangle.
 
     Args:
         triangles: int64[T, 3].
-        count: of vertices.
+        count: number of vertices.
     """
     counts = np.bincount(triangles.ravel(), minlength=count)
     order = np.argsort(triangles.ravel(), kind="stable")
@@ -130,7 +130,7 @@ def about(triangles: Ints, count: int) -> Ints:
 
 
 def nearest_rows(points: Floats, others: Floats) -> Ints:
-    """int64[n]: of each point the nearest of the others.
+    """The index of the nearest of `others` for each point, int64[n].
 
     Args:
         points: float64[n, 3].
@@ -141,7 +141,7 @@ def nearest_rows(points: Floats, others: Floats) -> Ints:
     out = np.empty(len(points), np.int64)
     for at in range(0, len(points), _AT_ONCE):
         some = points[at : at + _AT_ONCE]
-        # In one place again and again: new memory for each costs more than all sums.
+        # Reuse one buffer: new memory for each block costs more than all sums.
         near = np.matmul(some, others.T, out=room[: len(some)])
         np.subtract(half, near, out=near).argmin(axis=1, out=out[at : at + len(some)])
     return out
@@ -150,14 +150,14 @@ def nearest_rows(points: Floats, others: Floats) -> Ints:
 def nearest_places(
     positions: Floats, triangles: Ints, around: Ints, points: Floats, vertex: Ints | None = None
 ) -> Roots:
-    """Of each point the nearest place on the triangles about its nearest vertex.
+    """The nearest place to each point on the triangles about its nearest vertex.
 
     Args:
         positions: float64[V, 3].
         triangles: int64[T, 3].
         around: int64[V, n], triangles about each vertex.
         points: float64[n, 3].
-        vertex: int64[n], the vertex of each point, where it is known.
+        vertex: int64[n], the nearest vertex of each point, if known.
     """
     if vertex is None:
         vertex = nearest_rows(points, positions)
@@ -177,7 +177,7 @@ def nearest_places(
 
 
 def _apart(points: Floats, density: Floats, spacing: float) -> Ints:
-    """Numbers of points of which no two are too near, the first ones first."""
+    """Indices of points with the smallest distance between them; earlier points win."""
     reach = (spacing / np.sqrt(np.maximum(density, 1e-6))) ** 2
     keep = np.zeros(0, np.int64)
     rest = np.flatnonzero(density > 0.02)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Lips that rest on each other, teeth and gums; what keeps the tongue on the lip."""
+"""Closed lips, teeth and gums, and correctives that keep the tongue on the lip."""

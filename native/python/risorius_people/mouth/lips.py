@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lips that rest on each other: the data's are a millimetre apart, which is seen as a black line.
+"""Close the lips: the data's lips are a millimetre apart, which shows as a black line.
 
 Lengths are decimetres.
 """
@@ -13,27 +13,27 @@ import numpy as np
 from ..polygons import Floats, Ints, Polygons, subdivide
 from ..source import BaseMesh
 
-PRESSED = 0.0015  # how far they go into each other: skin that touches is pressed flat
-_REACH = 0.035  # from the line where they meet
-_NEAR = 0.06  # vertices of one lip so near to the other are its rim
-_BINS = 24  # across the mouth
+PRESSED = 0.0015  # lips overlap by this much: skin in contact is pressed flat
+_REACH = 0.035  # reach from the line where the lips meet
+_NEAR = 0.06  # a vertex this near to the other lip belongs to its lip's rim
+_BINS = 24  # number of bins across the mouth
 
 
 class Mouth:
-    """The faces of the mouth as they are seen, at LOD 0.
+    """The faces of the mouth as shown at LOD 0.
 
     Attributes:
-        operator: from the base mesh's vertices to those of the subdivided faces.
-        upper, lower: int[n], which of these belong to each lip.
+        operator: from vertices of the base mesh to vertices of the subdivided faces.
+        upper, lower: int[n], subdivided vertices of each lip.
     """
 
     def __init__(self, base: BaseMesh, pucker: Floats, jaw_open: Floats) -> None:
-        """Finds the lips by what moves them: space cannot tell them apart.
+        """Find the lips by their motion: their positions touch.
 
         Args:
             base: the base mesh.
-            pucker: float64[V, 3], a unit that moves both lips and little else.
-            jaw_open: float64[V, 3], the unit that takes the lower one along.
+            pucker: float64[V, 3], displacement of a unit that moves both lips and little else.
+            jaw_open: float64[V, 3], displacement of a unit that moves the lower lip.
         """
         strength = np.linalg.norm(pucker, axis=1)
         inside = strength > 0.08 * strength.max()
@@ -54,22 +54,22 @@ def rims(mouth: Mouth, points: Floats) -> tuple[Ints, Ints]:
     """Vertices of the upper and of the lower lip that lie near the other lip.
 
     Args:
-        mouth: whose.
-        points: float64[v, 3] of its subdivided vertices.
+        mouth: the mouth.
+        points: float64[v, 3], positions of its subdivided vertices.
     """
     apart = np.linalg.norm(points[mouth.upper][:, None] - points[mouth.lower][None], axis=2)
     return mouth.upper[apart.min(axis=1) < _NEAR], mouth.lower[apart.min(axis=0) < _NEAR]
 
 
 def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
-    """How far apart the lips are, from one corner to the other.
+    """Height of the gap between the lips, from one corner to the other.
 
     Args:
-        mouth: whose.
-        points: float64[v, 3] of its subdivided vertices.
+        mouth: the mouth.
+        points: float64[v, 3], positions of its subdivided vertices.
 
     Returns:
-        float64[n] places across, and float64[n] heights of the gap there, below 0 where they
+        Places across, float64[n], and heights of the gap there, float64[n], below 0 if the lips
         overlap.
     """
     upper, lower = (points[rim] for rim in rims(mouth, points))
@@ -87,11 +87,11 @@ def gap_across(mouth: Mouth, points: Floats) -> tuple[Floats, Floats]:
 
 
 def sealed(mouth: Mouth, positions: Floats) -> Floats:
-    """float64[V, 3]: positions with lips that touch; each goes half of the way.
+    """Positions with closed lips, float64[V, 3]; each lip goes half of the way.
 
     Args:
-        mouth: of the base mesh.
-        positions: float64[V, 3] of a person; they stay as they are.
+        mouth: the mouth of the base mesh.
+        positions: float64[V, 3] of a person; is not changed.
     """
     out = positions.copy()
     for _ in range(3):
@@ -102,7 +102,7 @@ def sealed(mouth: Mouth, positions: Floats) -> Floats:
         for lip, rim, way in zip(
             (mouth.upper, mouth.lower), rims(mouth, points), (-1, 1), strict=True
         ):
-            own = lip[lip < len(positions)]  # the first vertices are those of the base mesh
+            own = lip[lip < len(positions)]  # the first vertices are the vertices of the base mesh
             away = np.linalg.norm(points[own][:, None] - points[rim][None], axis=2).min(axis=1)
             half = np.interp(out[own, 0], places, (gaps + PRESSED) / 2)
             out[own, 1] += way * half * np.exp(-((away / _REACH) ** 2))

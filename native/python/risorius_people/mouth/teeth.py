@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Teeth and gums by code, along the arch of the base mesh's own teeth, which are bare strips.
+"""Teeth and gums made by code along the arch of the base mesh's own teeth, which are bare strips.
 
-A crown is a stack of rings between the biting edge and the gum; its measures are the means of grown
-people (Wheeler's Dental Anatomy, tables of the crowns). Lengths are decimetres, places those of the
-base mesh. As each vertex is an affine combination of the strip's vertices, teeth fit every head and
-go where those go.
+A crown is a stack of rings between the biting edge and the gum. Its measures are means of adults
+(Wheeler's Dental Anatomy, tables of the crowns). Lengths are decimetres, places are on the base
+mesh. Each vertex is an affine combination of the strip's vertices, so teeth fit every head and
+follow the strip.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ LOWER = (
     Tooth("molar", 11.0, 10.2, 7.3),
     Tooth("molar", 10.4, 10.0, 6.9),
 )
-# By height, 0 at the edge and 1 at the gum, a little of the root behind it: shares of half the
-# width and half the thickness, and how far the lip's side stands out, in mm.
+# By height (0 at the edge, 1 at the gum, more in the root): shares of half the width and of half
+# the thickness, and the offset of the lip side in mm.
 _HEIGHTS = (0.0, 0.05, 0.16, 0.38, 0.66, 0.88, 1.02, 1.25)
 _PROFILES = {
     "incisor": (
@@ -68,23 +68,24 @@ _PROFILES = {
         (-1.6, -0.9, -0.35, 0.15, 0.35, 0.2, -0.1, -0.5),
     ),
 }
-_GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)  # mm beyond the margin, on the side of the lip
-_GUM_OUT = (-0.9, 0.1, 0.4, 0.45, 0.0, -2.6)  # mm from the crown's lip side
+_GUM_HEIGHTS = (-0.15, 0.25, 1.0, 2.6, 5.2, 7.2)  # mm beyond the gum's margin, on the lip side
+_GUM_OUT = (-0.9, 0.1, 0.4, 0.45, 0.0, -2.6)  # mm outside the crown's lip side
 _PALATE_HEIGHTS = (-0.2, 0.3, 1.6, 4.2)
 _PALATE_IN = (0.9, -0.2, -1.6, -6.0)
 
 
 class Arch:
-    """The line of the biting edges, by its length from the middle, with a frame in each place."""
+    """The curve of the biting edges by its length from the middle, with a frame at each point."""
 
     def __init__(self, edge: Floats, up: float) -> None:
-        """From points of one half.
+        """Fit the curve to points of one half.
 
         Args:
-            edge: float64[n, 3], decimetres, the middle first.
-            up: 1 for the upper jaw, -1 for the lower one: where the gum is.
+            edge: float64[n, 3], decimetres, from the middle outward.
+            up: 1 for the upper jaw, -1 for the lower jaw: direction from the edge to the gum.
         """
-        # A smooth curve through few points: a polynomial in the share of the way, even in x.
+        # A smooth curve through few points: a polynomial in the share of the way. y and z are even
+        # in x.
         way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))])
         both = np.concatenate([-way[:0:-1], way])
         points = np.concatenate([edge[:0:-1] * (-1, 1, 1), edge])
@@ -100,19 +101,19 @@ class Arch:
         length = np.concatenate([[0], np.cumsum(steps)])
         self._length = length - length[-1] / 2
         self.half = float(length[-1] / 2)
-        # Towards the gum: upright on the plane in which the edges lie.
+        # The gum direction is normal to the plane of the edges.
         middle = points - points.mean(axis=0)
         normal = np.linalg.svd(middle)[2][2]
         self.up = up * normal * np.sign(normal[1])
 
     def at(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Places, the direction along the arch to the character's left, and that to the lips.
+        """Points, directions along the arch to the character's left, and directions to the lips.
 
         Args:
-            way: float64[n], decimetres from the middle, left positive.
+            way: float64[n], decimetres from the middle, positive on the left.
 
         Returns:
-            Three float64[n, 3].
+            Float64[n, 3] each.
         """
 
         def place(where: Floats) -> Floats:
@@ -134,7 +135,7 @@ class Arch:
 
 
 class Builder:
-    """Gathers rings and strips into one mesh."""
+    """Collects rings and strips into one mesh."""
 
     def __init__(self) -> None:
         self.points: list[Floats] = []
@@ -143,7 +144,7 @@ class Builder:
         self._count = 0
 
     def add(self, points: Floats, uvs: Floats) -> int:
-        """Takes vertices; the number of the first.
+        """Add vertices; returns the index of the first.
 
         Args:
             points: float64[n, 3], decimetres.
@@ -156,13 +157,13 @@ class Builder:
         return first
 
     def sheet(self, points: Floats, uvs: Floats, closed: bool, flip: bool) -> int:
-        """Takes a grid of vertices with quads between its rows; the number of the first.
+        """Add a grid of vertices with quads between its rows; returns the index of the first.
 
         Args:
             points: float64[rows, columns, 3], decimetres.
             uvs: float64[rows, columns, 2].
-            closed: whether the last column meets the first.
-            flip: whether faces are turned round.
+            closed: whether the last column joins the first.
+            flip: whether to reverse the faces.
         """
         rows, columns = points.shape[:2]
         first = self.add(points.reshape(-1, 3), uvs.reshape(-1, 2))
@@ -179,7 +180,7 @@ class Builder:
         return first
 
     def polygons(self) -> tuple[Polygons, Floats]:
-        """The mesh and float64[v, 3], its vertices."""
+        """The mesh, and the positions of its vertices, float64[v, 3]."""
         points = np.concatenate(self.points)
         uvs = np.concatenate(self.uvs)
         return Polygons(self.faces, self.faces, uvs, len(points)), points
@@ -188,7 +189,7 @@ class Builder:
 def arches(base: BaseMesh) -> dict[str, Arch]:
     """The arches of both jaws, from the strips of the base mesh.
 
-    The lower teeth bite behind the upper ones, as they do in most people.
+    The lower teeth bite behind the upper teeth, as in most people.
 
     Args:
         base: the base mesh.
@@ -198,7 +199,7 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
         used = np.unique([c[0] for f in base.faces[f"helper-{name}-teeth"] for c in f])
         p = base.positions[used]
         half = p[p[:, 0] > -1e-6]
-        # The edge is the outermost row on the biting side, lowest over a plane that it lies in.
+        # The edge is the outermost row on the biting side: the lowest above its own inclined plane.
         edge = half
         for _ in range(6):
             slope = np.polyfit(edge[:, 2], edge[:, 1], 1)[0]
@@ -214,11 +215,11 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
 
 
 def places_of(teeth: tuple[Tooth, ...], arch: Arch) -> tuple[Floats, float]:
-    """Where the middles of the crowns are along the arch, float64[n], and how much they are scaled.
+    """Middles of the crowns along the arch, float64[n], and the scale of their width.
 
     Args:
-        teeth: of one half, the middle first.
-        arch: theirs.
+        teeth: teeth of one half, from the middle outward.
+        arch: the arch of the teeth.
     """
     wide = np.array([t.wide for t in teeth]) * MM
     scale = min(1.0, 0.97 * arch.half / wide.sum())
@@ -231,12 +232,12 @@ def add_crown(
     """Add one tooth.
 
     Args:
-        out: gets it.
-        arch: it stands on.
+        out: the mesh to add to.
+        arch: the arch of the tooth.
         tooth: its measures.
-        way: where its middle is, decimetres from the middle of the arch.
-        scale: of its width.
-        around: vertices of a ring.
+        way: middle of the tooth, decimetres along the arch from its middle.
+        scale: scale of its width.
+        around: number of vertices per ring.
     """
     place, along, outward = (v[0] for v in arch.at(np.array([way])))
     up = arch.up
@@ -250,7 +251,7 @@ def add_crown(
     a = half_wide * wide[:, None] * c
     lip = stand[:, None] * MM - half_thick * thick[:, None] * (1 - s)
     lip = lip + 0.05 * high[:, None] * (1 if tooth.kind != "molar" else 0.3)  # roots lean back
-    lip = lip - (0.06 if tooth.kind != "molar" else 0.0) * a**2 / MM  # the lip's side is round
+    lip = lip - (0.06 if tooth.kind != "molar" else 0.0) * a**2 / MM  # the lip side is round
     rise = np.repeat(high[:, None], around, axis=1)
     share = np.clip(1 - np.array(_HEIGHTS) / 0.4, 0, 1)[:, None]
     if tooth.kind == "incisor":
@@ -277,13 +278,13 @@ def add_crown(
 
 
 def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> None:
-    """Add the gum of one jaw: its margin is scalloped by the necks of the teeth.
+    """Add the gum of one jaw; the necks of the teeth scallop its margin.
 
     Args:
-        out: gets it.
-        arch: of the jaw.
-        teeth: of one half, the middle first.
-        steps: columns for each tooth.
+        out: the mesh to add to.
+        arch: the arch of the jaw.
+        teeth: teeth of one half, from the middle outward.
+        steps: columns per tooth.
     """
     middles, scale = places_of(teeth, arch)
     wide = scale * np.array([t.wide for t in teeth]) * MM
@@ -299,7 +300,7 @@ def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> N
     margin = high - papilla * np.abs(within) ** 2.6
     thick = scale * np.interp(np.abs(way), middles, [t.thick for t in teeth]) * MM
     lean = np.interp(np.abs(way), middles, [0.05 if t.kind != "molar" else 0.015 for t in teeth])
-    between = 0.75 * MM * np.abs(within) ** 3  # between two crowns the gum draws in
+    between = 0.75 * MM * np.abs(within) ** 3  # the gum recedes between two crowns
     place, _, outward = arch.at(way)
     u = way / (2 * half[-1]) + 0.5
 
@@ -323,11 +324,11 @@ def add_gum(out: Builder, arch: Arch, teeth: tuple[Tooth, ...], steps: int) -> N
 
 
 def affine(base: Floats, chosen: Ints, points: Floats) -> Operator:
-    """The operator that gives points as affine combinations of vertices: the one of least weights.
+    """The operator with the smallest weights that gives points as affine combinations of vertices.
 
     Args:
         base: float64[V, 3], decimetres.
-        chosen: int[n] of the vertices, which do not lie in one plane.
+        chosen: int[n], indices of vertices that do not all lie in one plane.
         points: float64[m, 3].
     """
     p = np.column_stack([base[chosen], np.ones(len(chosen))])
@@ -339,7 +340,7 @@ def affine(base: Floats, chosen: Ints, points: Floats) -> Operator:
 
 
 def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
-    """The meshes of teeth and of gums of a level of detail.
+    """The meshes of teeth and gums at one LOD.
 
     Args:
         base: the base mesh.
@@ -363,10 +364,10 @@ def mouth_parts(base: BaseMesh, lod: int) -> list[Part]:
 
 
 def joined(parts: list[tuple[Polygons, Operator]]) -> tuple[Polygons, list[Operator]]:
-    """Two meshes as one, and its operator.
+    """Join two meshes into one, and give its operators.
 
     Args:
-        parts: the meshes, each with the operator that makes its vertices.
+        parts: the meshes, each with the operator of its vertices.
     """
     faces, uv_faces, rows, columns, weights = [], [], [], [], []
     count = uv_count = 0

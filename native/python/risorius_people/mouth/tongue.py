@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A tongue that is put out lies on the lower lip, wherever other controls take this lip.
+"""Correctives that keep a protruding tongue on the lower lip when other controls move the lip.
 
 Lengths are decimetres.
 """
@@ -14,27 +14,28 @@ from risorius.base.easing import smooth_step
 from ..polygons import Floats, Ints
 
 OUT = "tongueOut"
-# What lifts the middle of the lower lip farther than an open jaw takes the tongue off it.
+# Controls that lift the middle of the lower lip further than the open jaw drops the tongue.
 LIFTING = ("mouthCornerPull", "mouthPressD", "jawChinRaiseD")
-_JAW = 0.08  # by how much an open jaw takes the tongue off the lip, in which the data's lies
-_BEHIND = 0.22  # how far behind the lip the tongue begins to rise
-_EVEN = 0.05  # across: over such a width the lip's lift is evened out
+_JAW = 0.08  # drop of the tongue by an open jaw; the data's tongue lies in the lip
+_BEHIND = 0.22  # distance behind the lip at which the tongue begins to rise
+_EVEN = 0.05  # width across over which the lip's lift is averaged
 
 
 def over_lip(
     units: Mapping[str, Floats], positions: Floats, tongue: Ints, rim: Ints
 ) -> dict[tuple[str, str], Floats]:
-    """What lifts the tongue with the lower lip, by the two raw controls that it fires with.
+    """Displacements that lift the tongue with the lower lip, by the two raw controls of the
+    corrective.
 
     Args:
-        units: float64[V, 3], what each raw control does, by its name.
+        units: float64[V, 3], displacement of each raw control, by name.
         positions: float64[V, 3] of a person.
-        tongue: its vertices.
-        rim: vertices of the lower lip at the upper one.
+        tongue: indices of the tongue's vertices.
+        rim: vertices of the lower lip's rim, at the upper lip.
     """
     at = positions[tongue] + units[OUT][tongue]
     lip = positions[rim]
-    # At the lip and before it the whole lift, none at the root.
+    # The tongue lifts fully at the lip and in front of it, and not at all at its root.
     share = smooth_step((at[:, 2] - lip[:, 2].max()) / _BEHIND + 1.0)
     near = np.exp(-(((at[:, :1] - lip[None, :, 0]) / _EVEN) ** 2)) + 1e-12
     near /= near.sum(axis=1, keepdims=True)
@@ -47,7 +48,7 @@ def over_lip(
 
 
 def _up(positions: Floats, vertices: Ints, lift: Floats) -> Floats:
-    """float64[V, 3]: some vertices go up. Args: positions  float64[V, 3]; lift  of each."""
+    """Vertices lifted by y, float64[V, 3]. Args: positions  float64[V, 3]; lift  per vertex."""
     out = np.zeros_like(positions)
     out[vertices, 1] = lift
     return out

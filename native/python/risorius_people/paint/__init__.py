@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Textures of the sample people, painted from anatomy: every texel knows where on the head it lies.
+"""Textures of the sample people, painted from anatomy: each texel knows its place on the head.
 
 Colours are sRGB in [0, 1]; lengths are decimetres.
 """

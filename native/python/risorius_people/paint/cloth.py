@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The colour of a shirt: a jersey whose loops are seen from near by."""
+"""The colour of a shirt: jersey with visible loops."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ _LOOPS = 64  # across the texture, which repeats
 
 
 def paint_cloth(colour: tuple[float, float, float]) -> Floats:
-    """float64[CLOTH_SIZE, CLOTH_SIZE, 3]: loops in columns, each thread a little lighter or darker.
+    """Loops in columns; each thread is a little lighter or darker, float64[CLOTH_SIZE, CLOTH_SIZE,
+    3].
 
     Args:
         colour: sRGB in [0, 1].

@@ -15,26 +15,27 @@ from .skin import depth_of
 EYE_SIZE = 1024
 _WHITE, _PINK, _VESSEL = (0.80, 0.755, 0.71), (0.83, 0.62, 0.56), (0.66, 0.24, 0.20)
 _SHADE = (0.60, 0.47, 0.43)
-_COLLARETTE = 0.30  # of the way from the pupil to the root
+_COLLARETTE = 0.30  # place of the frill, as a share of the way from the pupil to the root
 _CRYPTS = 46
 _VESSELS = 110
 
 
 def paint_eye(person: Person) -> Floats:
-    """Pupil, iris of fibres, a dark soft limbus, sclera that is not white; the gaze in the middle.
+    """The eye texture: pupil, iris of fibres, dark soft limbus, off-white sclera; the gaze in the
+    middle.
 
-    The iris has the larger part of the picture, see side_map.
+    The iris fills most of the texture, see side_map.
     """
     random = np.random.default_rng(11)
     at = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE - 0.5
     x, y = np.meshgrid(at, at)
     away, around = np.hypot(x, y), np.arctan2(y, x) / (2 * np.pi) % 1
     colour = _sclera(side_angle(np.maximum(away, IRIS_AT)), x / np.maximum(away, 1e-9), random)
-    colour *= 1 - 0.23 * depth_of(person)  # beside dark skin the same white would glow
+    colour *= 1 - 0.23 * depth_of(person)  # next to dark skin the same white would glow
     reach = (away / IRIS_AT - PUPIL) / (1 - PUPIL)  # 0 at the pupil, 1 at the limbus
     iris = _iris(person, around, reach, random)
     wobble = 0.012 * _polar(around, 0 * reach, 53, 1, random)
-    # The limbus is no line: the sclera grows clear over a millimetre.
+    # The limbus is soft: the sclera turns clear over a millimetre.
     inside = 1 - smooth(0.955, 1.13, reach + wobble)
     colour = colour * (1 - inside[:, :, None]) + iris * inside[:, :, None]
     halo = np.exp(-(((reach - 1.07) / 0.10) ** 2))
@@ -45,14 +46,14 @@ def paint_eye(person: Person) -> Floats:
 def _polar(
     around: Floats, along: Floats, cells: int, rings: int, random: np.random.Generator
 ) -> Floats:
-    """float64[h, w] from -1 to 1: smooth noise that closes around the pupil.
+    """Smooth noise from -1 to 1 that is seamless around the pupil, float64[h, w].
 
     Args:
         around: float64[h, w], the angle in turns.
-        along: float64[h, w], 0 at the pupil, 1 at the limbus; held within.
-        cells: of the noise around.
-        rings: of the noise from the pupil to the limbus.
-        random: gives it.
+        along: float64[h, w], 0 at the pupil, 1 at the limbus; clipped.
+        cells: noise cells around the pupil.
+        rings: noise cells from the pupil to the limbus.
+        random: source of the noise.
     """
     grid = random.uniform(-1, 1, (cells, rings + 1))
     a = around % 1 * cells
@@ -66,7 +67,7 @@ def _polar(
 
 
 def _fibres(around: Floats, reach: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w] from 0 to 1: strands that wander, part and meet again on their way outwards."""
+    """Fibres that wander, part and meet on their way outward, float64[h, w] from 0 to 1."""
     bent = around + 0.0055 * _polar(around, reach, 17, 3, random)
     bent = bent + 0.0025 * _polar(around, reach, 61, 4, random)
     out = np.zeros_like(around)
@@ -77,13 +78,13 @@ def _fibres(around: Floats, reach: Floats, random: np.random.Generator) -> Float
 
 
 def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w, 3]: the iris and the pupil in it; beyond the limbus it goes on as its rim.
+    """The iris with the pupil; beyond the limbus its rim continues, float64[h, w, 3].
 
     Args:
-        person: has its colours.
+        person: has the iris colours.
         around: float64[h, w], the angle in turns.
         reach: float64[h, w], 0 at the pupil, 1 at the limbus.
-        random: gives fibres and crypts.
+        random: source of fibres and crypts.
     """
     inner, outer = np.array(person.iris[0]), np.array(person.iris[1])
     frill = _COLLARETTE + 0.035 * _polar(around, 0 * reach, 41, 1, random)
@@ -93,7 +94,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
     depth = np.clip(beyond * 0.75 + 0.3 * smooth(0.2, 0.95, reach) + patches, 0, 1)[:, :, None]
     colour = inner * (1 - depth) + outer * depth
     fibres = _fibres(around, reach, random)
-    # Inside the frill they are short and fine.
+    # Inside the frill fibres are short and fine.
     contrast = 0.45 + 0.55 * beyond
     light = 0.50 + 1.05 * (0.5 + contrast * (fibres - 0.5))
     light += 0.30 * np.exp(-(((reach - frill) / 0.045) ** 2)) * (0.4 + fibres)
@@ -114,7 +115,7 @@ def _iris(person: Person, around: Floats, reach: Floats, random: np.random.Gener
 
 
 def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w] from 0 to 1: gaps between the fibres, lozenges, most of them at the frill."""
+    """Crypts: lozenge gaps between the fibres, mostly at the frill, float64[h, w] from 0 to 1."""
     out = np.zeros_like(around)
     for _ in range(_CRYPTS):
         where, at = random.uniform(), random.choice([0.06, 0.16, 0.30]) + random.normal(0, 0.04)
@@ -127,12 +128,13 @@ def _crypts(around: Floats, reach: Floats, frill: Floats, random: np.random.Gene
 
 
 def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats:
-    """float64[h, w, 3]: warm grey, red and darker towards the corners, with faint vessels.
+    """The sclera: warm grey, redder and darker at the corners, with faint vessels, float64[h, w,
+    3].
 
     Args:
         angle: float64[h, w], from the gaze, radians.
         aside: float64[h, w], 1 and -1 in the direction of the corners, 0 above and below.
-        random: gives patches and vessels.
+        random: source of patches and vessels.
     """
     colour = np.ones((*angle.shape, 3)) * np.array(_WHITE)
     patches = 0.5 + 0.5 * noise(len(angle), 14, random)
@@ -143,10 +145,11 @@ def _sclera(angle: Floats, aside: Floats, random: np.random.Generator) -> Floats
 
 
 def vessels(random: np.random.Generator) -> Floats:
-    """Fine blood vessels [EYE_SIZE, EYE_SIZE], 0 to 1: they wander in from behind, fork, thin out.
+    """Fine blood vessels that wander in from behind, fork and thin out, [EYE_SIZE, EYE_SIZE], 0 to
+    1.
 
     Args:
-        random: gives their ways.
+        random: source of their paths.
     """
     image = np.zeros((EYE_SIZE, EYE_SIZE))
     ways = []
@@ -191,6 +194,6 @@ def _draw(image: Floats, points: Floats) -> None:
 
 
 def _soft(image: Floats) -> Floats:
-    """An image whose lines are two texels wide and have a faint halo."""
+    """An image with its lines widened to two texels and a faint halo."""
     near = sum(np.roll(image, shift, axis) for axis in (0, 1) for shift in (-1, 1))
     return np.asarray(np.clip(0.7 * image + 0.2 * near, 0, 1))

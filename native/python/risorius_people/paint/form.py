@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The form that a divided mesh rounds off: beside a nostril, at a lip's rim, under an eye.
+"""Fine form of the face that the mesh shows too softly: beside a nostril, at a lip's rim, under an
+eye.
 
-How far a vertex stands out of the mean of its neighbourhood, or lies below it, is form that the
-mesh has and shows too softly. The skin's relief has it once more, an unsharp mask of the surface,
-and its hollows take colour.
+A vertex that stands out of the mean of its neighbourhood, or lies below it, is form. The mesh shows
+it too softly, so the skin's relief adds it once more: an unsharp mask of the surface. Hollows of
+the form also get colour.
 """
 
 from __future__ import annotations
@@ -18,24 +19,25 @@ from .images import smooth
 from .raster import filled
 from .skin import Texels
 
-# Rounds of neighbours over which a mean is taken, and the share of what stands out of it that the
-# relief has: what is some three millimetres wide, and some eight.
+# Smoothing rounds of each mean, and the share of the form that the relief adds: forms about 3 mm
+# wide, and about 8 mm wide.
 _SCALES = ((6, 1.4), (30, 0.42))
-_MOST = 0.016  # decimetres: more would be the head's own form and not its skin's
-_SOFT = 5.0  # texels of HEAD_SIZE over which the mesh's edges are evened out
-_HOLLOW = 0.006  # decimetres at which a hollow has all of its colour
-_AGES = ((8, 25), (0.5, 1.0))  # years, and how much of it: a child's face is round
+_MOST = 0.016  # decimetres: larger form belongs to the head, not to its skin
+_SOFT = 5.0  # texels of HEAD_SIZE over which the mesh's edges are blurred
+_HOLLOW = 0.006  # decimetres: depth of a hollow with full colour
+# Years, and the share of the form at that age: a child's face is round.
+_AGES = ((8, 25), (0.5, 1.0))
 
 
 def stressed(polygons: Polygons, places: Floats) -> Floats:
-    """float64[V]: how far each vertex stands out of those about it; negative: lies below them.
+    """Height of each vertex above its neighbourhood, float64[V]; negative: below it.
 
     Args:
         polygons: the mesh.
         places: float64[V, 3] of its vertices, decimetres.
 
     Returns:
-        Decimetres, each scale's share of it, at most _MOST.
+        Decimetres: the weighted sum over the scales, at most _MOST.
     """
     edges = np.array(list(edges_of(polygons.faces)))
     about = np.maximum(np.bincount(edges.ravel(), minlength=len(places)), 1)[:, None]
@@ -51,7 +53,7 @@ def stressed(polygons: Polygons, places: Floats) -> Floats:
 
 
 def _neighbours(edges: Ints, values: Floats) -> Floats:
-    """float64[V, k]: the sum over each vertex's neighbours."""
+    """The sum over the neighbours of each vertex, float64[V, k]."""
     columns = [
         sum(np.bincount(a, column[b], len(column)) for a, b in (edges.T, edges.T[::-1]))
         for column in values.T
@@ -60,16 +62,16 @@ def _neighbours(edges: Ints, values: Floats) -> Floats:
 
 
 def form(polygons: Polygons, places: Floats, face: regions.Face, texels: Texels) -> Floats:
-    """float32[n]: heights of the face's form at the texels, decimetres.
+    """Heights of the face's form at the texels, float32[n], decimetres.
 
-    Not where lips or lids meet, whose rims are one with the surface behind them, and not on
+    Zero where lips or lids meet, because their rims are one with the surface behind them, and on
     ears, scalp and neck.
 
     Args:
-        polygons: of the head.
+        polygons: polygons of the head.
         places: float64[V, 3] of the person's own vertices, decimetres.
-        face: the vertices on the man, by whom places of the face are known.
-        texels: of the texture.
+        face: the vertices on the man, which give the places of the face.
+        texels: texels of the texture.
     """
     there = smooth(-1.25, -1.05, face.y) * smooth(0.6, 0.3, face.y) * smooth(-0.45, -0.1, face.z)
     there = there * smooth(1.5, 4.0, face.mouth) * smooth(1.5, 4.5, face.eyes)
@@ -80,12 +82,12 @@ def form(polygons: Polygons, places: Floats, face: regions.Face, texels: Texels)
 
 
 def share_at(age: int) -> float:
-    """How much of a face's form shows at an age in years, up to 1."""
+    """The share of a face's form at an age in years, up to 1."""
     return float(np.interp(age, *_AGES))
 
 
 def hollows(form: Floats) -> Floats:
-    """float32[n], 0 to 1: how deep in a hollow of the form a texel lies.
+    """Depth of each texel in a hollow of the form, float32[n], 0 to 1.
 
     Args:
         form: float32[n], decimetres.

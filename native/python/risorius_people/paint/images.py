@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What all pictures are made with: sizes, steps, noise, layers."""
+"""Tools for all textures: sizes, smooth steps, noise, layers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from ..polygons import Floats
 
 
 def shrunk(image: Floats, side: int) -> Floats:
-    """An image of at most as many texels as a square of this side: the mean of 2 x 2, repeatedly.
+    """An image halved until it has at most side * side texels; each new texel is the mean of 2 x 2.
 
     Args:
         image: float64[h, w, ...]; h and w are powers of two.
-        side: of the square.
+        side: side of the largest square.
     """
     while image.shape[0] * image.shape[1] > side * side:
         blocks = image.reshape(image.shape[0] // 2, 2, image.shape[1] // 2, 2, *image.shape[2:])
@@ -23,11 +23,11 @@ def shrunk(image: Floats, side: int) -> Floats:
 
 
 def enlarged(image: Floats, side: int) -> Floats:
-    """An image [h, w] at this side, linear between the texels.
+    """An image [h, h] enlarged to this side, linear between the texels.
 
     Args:
         image: float[h, h].
-        side: a whole number of times h.
+        side: a multiple of h.
     """
     times = side // len(image)
     at = (np.arange(side) + 0.5) / times - 0.5
@@ -38,7 +38,7 @@ def enlarged(image: Floats, side: int) -> Floats:
 
 
 def smooth(low: float, high: float, x: Floats) -> Floats:
-    """0 where x is at low, 1 where it is at high, and smoothly in between; held beyond both."""
+    """0 at x = low and below, 1 at x = high and above, smooth in between."""
     return smooth_step((x - low) / (high - low))
 
 
@@ -47,8 +47,8 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
 
     Args:
         size: texels of a side.
-        cells: of the grid along a side; more of them make the noise finer.
-        random: gives the grid.
+        cells: grid cells along a side; more cells make finer noise.
+        random: source of the grid.
     """
     grid = random.uniform(-1, 1, (cells + 1, cells + 1))
     at = np.linspace(0, cells, size, endpoint=False)
@@ -59,6 +59,6 @@ def noise(size: int, cells: int, random: np.random.Generator) -> Floats:
 
 
 def blend(image: Floats, colour: tuple[float, float, float], mask: Floats) -> Floats:
-    """An image [h, w, 3] with a colour laid over it where a mask [h, w] says, from 0 to 1."""
+    """An image [h, w, 3] with a colour laid over it by a mask [h, w] from 0 to 1."""
     mask = np.clip(mask, 0, 1)[:, :, None]
     return image * (1 - mask) + np.array(colour) * mask

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Patterns of skin as tiles that begin again: mottling, dots, pores, the fine net between them.
+"""Seamless tiles of skin patterns: mottling, dots, pores and the fine net between them.
 
-Lengths are texels of the tile, whose sides wrap: it is laid over a texture by `laid`.
+Lengths are texels of the tile. Tiles wrap around; `laid` lays them over a texture.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..polygons import Floats, Ints
 def mottling(
     side: int, width: float, random: np.random.Generator, high: float | None = None
 ) -> Floats:
-    """float32[side, side]: smooth noise of mean 0 and deviation 1, its spots about `width` wide.
+    """Smooth noise with mean 0 and deviation 1; spots are about `width` wide, float32[side, side].
 
     Args:
-        side: of the tile.
-        width: of a spot.
-        random: gives the spots.
-        high: of a spot; None: as wide.
+        side: side of the tile.
+        width: width of a spot.
+        random: source of the spots.
+        high: height of a spot; None: the same as `width`.
     """
     across = np.fft.rfftfreq(side) * width
     up = np.fft.fftfreq(side) * (width if high is None else high)
@@ -35,12 +35,12 @@ def mottling(
 
 @dataclass(frozen=True)
 class Dots:
-    """Points spread evenly and by chance, one in each cell of a grid.
+    """Points spread evenly at random, one in each cell of a grid.
 
     Attributes:
-        near: float32[side, side]: distance to the nearest point, over a cell's side.
-        gap: float32[side, side]: how much farther the second nearest is.
-        rank: float32[side, side]: a number from 0 to 1 that the nearest point has for itself.
+        near: float32[side, side]: distance to the nearest point, in cell sides.
+        gap: float32[side, side]: distance to the second nearest point, minus `near`.
+        rank: float32[side, side]: random number of the nearest point, 0 to 1.
     """
 
     near: Floats
@@ -50,17 +50,18 @@ class Dots:
     def over(
         self, share: Floats, at: Ints, size: float, soft: float = 0.35, bent: Floats | float = 0.0
     ) -> Floats:
-        """float32[n]: 1 in the dots of a share of the points, 0 between them, at some texels.
+        """A mask with a dot at a share of the points, float32[n], at some texels: 1 in a dot, 0
+        outside.
 
         Args:
-            share: float[n] from 0 to 1: of the points that have a dot.
-            at: where on the tile, see `laid`.
-            size: radius of the largest over a cell's side.
+            share: float[n] from 0 to 1, share of the points with a dot.
+            at: places on the tile, see `laid`.
+            size: radius of the largest dots, in cell sides.
             soft: share of the radius over which a dot fades out.
-            bent: float[n], added to the distance, so that dots are not round.
+            bent: float[n], added to the distance to make dots irregular.
         """
         rank = self.rank.ravel()[at]
-        # A dot grows with what there is over its rank: at the edge of a field they are small.
+        # A dot grows with share - rank, so dots at the edge of a field are small.
         radius = size * np.clip(1.6 * (share - rank) / np.maximum(share, 1e-6), 0, 1)
         depth = (radius - self.near.ravel()[at] - bent) / np.maximum(soft * radius, 1e-6)
         return np.asarray(np.clip(depth, 0, 1) * (share > rank), np.float32)
@@ -70,10 +71,10 @@ def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8
     """A tile of dots.
 
     Args:
-        side: of the tile.
-        cell: side of a grid's cell, about; a whole number of them fills the tile.
-        random: gives the points.
-        loose: how far a point may lie from the middle of its cell, 0 to 1.
+        side: side of the tile.
+        cell: approximate side of a cell; a whole number of cells fills the tile.
+        random: source of the points.
+        loose: largest distance of a point from the middle of its cell, 0 to 1.
     """
     count = max(3, round(side / cell))
     point = (0.5 + loose * random.uniform(-0.5, 0.5, (count, count, 2))).astype(np.float32)
@@ -97,13 +98,13 @@ def dots(side: int, cell: float, random: np.random.Generator, loose: float = 0.8
 
 
 def laid(where: Ints, size: int, side: int, shift: tuple[int, int] = (0, 0)) -> Ints:
-    """int[n]: the texels of a tile that lie under those of a texture.
+    """The texel of a tile below each texel of a texture, int[n].
 
     Args:
-        where: int[n], texels of the texture, counted along its rows.
-        size: of the texture's side.
-        side: of the tile.
-        shift: of the tile, so that two patterns do not begin together.
+        where: int[n], texels of the texture, counted row by row.
+        size: side of the texture.
+        side: side of the tile.
+        shift: offset of the tile, so that two patterns do not start together.
     """
     rows, columns = np.divmod(where, size)
     return np.asarray(((rows + shift[0]) % side) * side + (columns + shift[1]) % side)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where hair grows on the man's head, as densities of its vertices, drawn beside his eyes.
+"""Places of hair on the man's head, as densities of vertices relative to his eyes.
 
 All maps are in decimetres relative to the middle of the eyes: x to the side, y up, z to the front.
 """
@@ -44,17 +44,17 @@ HAIRLINES = {  # by style: recession, sideburn and low of hairline_height
     "afro": (0.0, 0.6, 0.0),
 }
 _THIN_TOP = {"receding": 0.55}
-_NO_SIDEBURN = slice(9, 12)  # points of the line that hang down before the ear
+_NO_SIDEBURN = slice(9, 12)  # points of the line in front of the ear
 
 
 def wavy(points: Floats, random: np.random.Generator, waves: float, count: int = 12) -> Floats:
-    """float64[n] of smooth noise in about [-1, 1] at places of space.
+    """Smooth noise in about [-1, 1] at points in space, float64[n].
 
     Args:
         points: float64[n, 3].
-        random: gives it.
-        waves: how many lie on a decimetre.
-        count: of the waves that are added.
+        random: source of the noise.
+        waves: waves per decimetre.
+        count: number of waves to add.
     """
     ways = random.normal(0, 1, (count, 3))
     ways *= 2 * np.pi * waves / np.linalg.norm(ways, axis=1, keepdims=True)
@@ -65,13 +65,13 @@ def wavy(points: Floats, random: np.random.Generator, waves: float, count: int =
 def hairline_height(
     points: Floats, recession: float = 0.0, sideburn: float = 1.0, low: float = 0.0
 ) -> Floats:
-    """float64[n]: how far inside the hairline a place is, negative outside of it.
+    """Distance inside the hairline, float64[n], negative outside.
 
     Args:
-        points: float64[n, 3], of the man.
-        recession: how far the line has gone back above the temples and the forehead, 0 to 1.
-        sideburn: how much of the hair before the ear there is, 0 to 1.
-        low: how much lower and rounder the line over the forehead is, as on women, 0 to 1.
+        points: float64[n, 3], on the man.
+        recession: how far the hairline has receded at temples and forehead, 0 to 1.
+        sideburn: length of the hair in front of the ear, 0 to 1.
+        low: how low and round the line over the forehead is, as on women, 0 to 1.
     """
     line = _LINE.copy()
     line[_NO_SIDEBURN, 1] = (1 - sideburn) * 0.1 + sideburn * line[_NO_SIDEBURN, 1]
@@ -91,28 +91,28 @@ def hairline_height(
 
 
 def thinned(points: Floats, style: str) -> Floats:
-    """float64[n]: the share of hair that is lost on top.
+    """The share of hair lost on top, float64[n].
 
     Args:
-        points: float64[n, 3], of the man.
-        style: of people.HAIR_STYLES.
+        points: float64[n, 3], on the man.
+        style: one of people.HAIR_STYLES.
     """
     return np.asarray(_THIN_TOP.get(style, 0.0) * smooth_step((points[:, 1] - 0.55) / 0.3))
 
 
 def brow_place(points: Floats, eye: float) -> tuple[Floats, Floats]:
-    """Place along a brow, 0 at the nose and 1 at the temple, and height over its middle.
+    """Place along a brow, 0 at the nose and 1 at the temple, and height over its middle line.
 
     Args:
-        points: float64[n, 3], of the man.
-        eye: how far the middle of his eye is from the middle of the face.
+        points: float64[n, 3], on the man.
+        eye: distance of his eye's middle from the middle of the face.
     """
     along = (np.abs(points[:, 0]) - (eye - 0.185)) / 0.44
     return along, points[:, 1] - brow_ridge(along)
 
 
 def brow_ridge(along: Floats) -> Floats:
-    """float64[n]: how high the middle of a brow is over the eye's, decimetres.
+    """Height of a brow's middle line over the eye's middle, float64[n], decimetres.
 
     Args:
         along: float64[n], 0 at the nose and 1 at the temple.
@@ -125,7 +125,7 @@ def brow_ridge(along: Floats) -> Floats:
 
 
 def brow_width(along: Floats) -> Floats:
-    """float64[n]: half the width of a brow, decimetres.
+    """Half the width of a brow, float64[n], decimetres.
 
     Args:
         along: float64[n], 0 at the nose and 1 at the temple.
@@ -134,11 +134,12 @@ def brow_width(along: Floats) -> Floats:
 
 
 def brow_density(points: Floats, eye: float) -> Floats:
-    """float64[n], 0 to 1: thinner at both ends, its lower edge cleaner than its upper one.
+    """Density of a brow, float64[n], 0 to 1: thin at both ends, with a cleaner edge below than
+    above.
 
     Args:
-        points: float64[n, 3], of the man.
-        eye: how far the middle of his eye is from the middle of the face.
+        points: float64[n, 3], on the man.
+        eye: distance of his eye's middle from the middle of the face.
     """
     along, height = brow_place(points, eye)
     across = height / brow_width(np.clip(along, 0, 1))
@@ -148,15 +149,15 @@ def brow_density(points: Floats, eye: float) -> Floats:
 
 
 def beard_density(points: Floats, lips: Floats, style: str) -> Floats:
-    """float64[n], 0 to 1: of the hair of the lower face.
+    """Density of the beard, float64[n], 0 to 1.
 
     Args:
-        points: float64[n, 3], of the man.
+        points: float64[n, 3], on the man.
         lips: float64[n], 1 on the lips and in the mouth.
-        style: of people.BEARD_STYLES, but "none".
+        style: one of people.BEARD_STYLES except "none".
     """
     x, y, z = np.abs(points[:, 0]), points[:, 1], points[:, 2]
-    # From before the ear down over the cheek to the corner of the mouth.
+    # From the front of the ear down over the cheek to the corner of the mouth.
     cheek = np.interp(z, [-0.62, -0.45, -0.2, 0.0, 0.15], [-0.10, -0.22, -0.46, -0.56, -0.66])
     under = np.interp(z, [-0.6, -0.3, 0.0, 0.3], [-0.90, -1.02, -1.20, -1.30])
     edge = smooth_step((cheek - y) / 0.10) * smooth_step((y - under) / 0.12)

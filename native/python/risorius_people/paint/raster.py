@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From vertices to texels."""
+"""Interpolate values of vertices at texels."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import numpy as np
 
 from ..polygons import Floats, Ints, Polygons
 
-_AT_ONCE = 1 << 20  # texels that are looked at in one go
+_AT_ONCE = 1 << 20  # texels per block
 
 
 class Raster:
-    """Which corners each texel lies between, and where: found once, for any values of vertices.
+    """The triangle and the weights of each covered texel, found once for any values of vertices.
 
     Attributes:
-        covered: bool[size, size]: which texels a face covers.
-        where: int[n]: these texels, counted along the rows.
+        covered: bool[size, size]: texels that a face covers.
+        where: int[n]: the covered texels, counted row by row.
     """
 
     def __init__(self, polygons: Polygons, uvs: Floats, size: int) -> None:
-        """Finds the texels of all faces; of two on the same texel the later one has it.
+        """Find the texels of all faces; where two faces overlap, the later one wins.
 
         Args:
             polygons: the mesh.
@@ -58,7 +58,7 @@ class Raster:
     def _triangles(
         self, begin: int, end: int, low: Ints, span: Ints, room: Ints, size: int
     ) -> None:
-        """The texels of some triangles, looked for in the rectangle around each."""
+        """Texels inside some triangles, searched in the rectangle around each."""
         count = room[begin:end]
         which = np.repeat(np.arange(begin, end), count)
         if not len(which):
@@ -81,7 +81,7 @@ class Raster:
         self._all_shares[texel] = np.column_stack([b, c])[inside]
 
     def values(self, values: Floats) -> Floats:
-        """float32[n, k]: values of vertices at the covered texels.
+        """Values of vertices at the covered texels, float32[n, k].
 
         Args:
             values: float[V, k].
@@ -94,10 +94,10 @@ class Raster:
         return np.asarray(out)
 
     def steps(self, places: Floats) -> Floats:
-        """float32[n, 2]: how long a texel is across and up, at the covered texels.
+        """Width and height of each covered texel on the surface, float32[n, 2].
 
         Args:
-            places: float64[V, 3] of the vertices; lengths are in their unit.
+            places: float64[V, 3] of the vertices; results are in the same unit.
         """
         uv = np.stack([self._uv[:, k] - self._uv[:, 0] for k in (1, 2)], axis=1)
         edges = places[self._corners[:, 1:]] - places[self._corners[:, :1]]
@@ -108,10 +108,11 @@ class Raster:
         return np.asarray(lengths[self._owner])
 
     def spread(self, values: Floats) -> Floats:
-        """float32[size, size] or [size, size, k]: an image of values at the covered texels.
+        """An image of values at the covered texels, 0 elsewhere, float32[size, size] or [size,
+        size, k].
 
         Args:
-            values: float[n] or [n, k], as they are found by `values`; 0 elsewhere.
+            values: float[n] or [n, k], as `values` returns them.
         """
         size = len(self.covered)
         out = np.zeros((size * size, *values.shape[1:]), np.float32)
@@ -119,7 +120,7 @@ class Raster:
         return out.reshape(size, size, *values.shape[1:])
 
     def image(self, values: Floats) -> Floats:
-        """float32[size, size, k]: values of vertices; 0 where no face is.
+        """An image of values of vertices, 0 where no face is, float32[size, size, k].
 
         Args:
             values: float[V, k].
@@ -128,14 +129,14 @@ class Raster:
 
 
 def filled(image: Floats, covered: Floats) -> Floats:
-    """An image whose bare texels have the colours of those about them, near ones first.
+    """An image whose uncovered texels get the colours of near covered texels.
 
-    So filtering finds no foreign colour at the rims of the islands, and what lies between them
-    packs to little.
+    Texture filtering then meets no foreign colour at the rims of islands, and the space between
+    them compresses well.
 
     Args:
         image: float[h, w, ...]; h and w are powers of two.
-        covered: bool[h, w]: what is painted.
+        covered: bool[h, w]: the painted texels.
     """
     bare = ~covered
     share = covered.astype(np.float32)
@@ -156,7 +157,7 @@ def _halves(whole: Floats) -> Floats:
 
 
 def _filled(image: Floats, share: Floats) -> Floats:
-    """Means of texels of which a share is covered, and where none is those of coarser ones."""
+    """Means of covered texels; a texel without any takes the value of the next coarser level."""
     mean = image / np.maximum(share, 1e-6)
     bare = share == 0
     if min(image.shape[:2]) < 2 or not bare.any():

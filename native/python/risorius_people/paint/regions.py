@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where on a head blood, pigment, hair roots, pores and oil are: smooth fields of its vertices.
+"""Where a head has blood, pigment, hair roots, pores and oil: smooth fields over its vertices.
 
-Measured from the left eye's middle, in decimetres: `x` from the middle of the face, `y` up, `z` to
-the front. All people have the topology and the textures' places of the man, so these are his.
+Places are in decimetres from the left eye's middle: `x` from the middle of the face, `y` up, `z` to
+the front. All people share topology and texture layout with the man, so his fields serve all.
 """
 
 from __future__ import annotations
@@ -19,24 +19,25 @@ from .images import smooth
 from .layout import islands
 
 FAR_RINGS = 14.0
-LIPS_RINGS = 8.0  # loops of the base mesh from where the mouth's own island begins to the lips' rim
-DIVIDED = 2.0  # edges of the head of LOD 0 that one of the base mesh was divided into
-_REACH = 0.12  # decimetres: spots of the noise that makes fields uneven
+LIPS_RINGS = 8.0  # edge loops of the base mesh from the mouth's island to the rim of the lips
+DIVIDED = 2.0  # each edge of the base mesh is this many edges of the head at LOD 0
+_REACH = 0.12  # decimetres: spot size of the noise that makes fields uneven
 
 
 @dataclass
 class Face:
-    """The head's vertices, measured from the left eye.
+    """The head's vertices, relative to the left eye.
 
     Attributes:
-        x: float64[V], signed; the left is positive.
+        x: float64[V]; the character's left is positive.
         y: float64[V], up.
         z: float64[V], to the front.
-        lids: float64[V], how far a vertex closes the eye, 0 to 1.
-        mouth: float64[V], loops of the base mesh away from the mouth's inside, which begins where
-            its island of the texture does; negative in it.
-        eyes: float64[V], the same for what lies behind the lids.
-        uneven: float64[V, 3], noise of mean 0 and deviation about 1, the same at seams.
+        lids: float64[V], share of a vertex in the blink, 0 to 1.
+        mouth: float64[V], edge loops of the base mesh outside the mouth's inside (its own island of
+            the texture); negative inside.
+        eyes: float64[V], the same for the skin behind the lids.
+        uneven: float64[V, 3], noise with mean 0 and deviation about 1, equal on both sides of
+            seams.
     """
 
     x: Floats
@@ -53,11 +54,11 @@ class Face:
         return np.abs(self.x)
 
     def spot(self, x: float, y: float, wide: float, high: float) -> Floats:
-        """float64[V]: 1 at a place of the front and its mirror image, less about it.
+        """A spot at a place of the front and at its mirror image, float64[V]: 1 in its middle.
 
         Args:
-            x, y: the place.
-            wide, high: where it is down to a third.
+            x, y: middle of the spot.
+            wide, high: distance from the middle at which it falls to a third.
         """
         away = ((self.aside - x) / wide) ** 2 + ((self.y - y) / high) ** 2
         return np.asarray(np.exp(-away) * smooth(-0.5, -0.1, self.z))
@@ -69,11 +70,11 @@ def find_face(
     """The face of a head.
 
     Args:
-        part: the head.
+        part: the mesh of the head.
         positions: float64[V, 3] of its vertices, decimetres.
         eye: float64[3], the left eye's middle.
-        units: what each raw control does, by its name.
-        step: edges of this head that one of the base mesh was divided into.
+        units: expression of each raw control, by name.
+        step: each edge of the base mesh is this many edges of this head.
     """
     blink = sum(
         np.linalg.norm(part.carry(units[name].displacement), axis=1)
@@ -95,10 +96,10 @@ def find_face(
 
 
 def inner_rings(polygons: Polygons, places: Floats) -> tuple[Floats, Floats]:
-    """float64[V] twice: edges away from the mouth's inside and from the eyes', negative within.
+    """Edges from the mouth's inside and from the eyes' inside, float64[V] each, negative inside.
 
     Args:
-        polygons: of the head; the insides are islands of its texture of their own.
+        polygons: polygons of the head; the insides are islands of its texture.
         places: float64[V, 3], measured from the left eye, decimetres.
     """
     label = islands(polygons)
@@ -123,10 +124,10 @@ def inner_rings(polygons: Polygons, places: Floats) -> tuple[Floats, Floats]:
 
 
 def lips_of(rings: Floats) -> Floats:
-    """float64[V]: 1 on the lips and in the mouth, where no hair grows.
+    """1 on the lips and in the mouth, where no hair grows, float64[V].
 
     Args:
-        rings: float64[V], `mouth` of a Face.
+        rings: float64[V], `Face.mouth`.
     """
     return smooth(LIPS_RINGS + 1.0, LIPS_RINGS, rings)
 
@@ -146,12 +147,12 @@ def _rings(edges: Ints, inside: Ints, outside: Ints) -> Floats:
 
 
 def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Floats:
-    """float64[n]: smooth noise of space, of mean 0 and deviation about 1.
+    """Smooth noise in space, float64[n], with mean 0 and deviation about 1.
 
     Args:
         places: float64[n, 3].
-        pitch: of its grid, in their unit.
-        random: gives the grid.
+        pitch: pitch of its grid, in the unit of `places`.
+        random: source of the grid.
     """
     low = places.min(axis=0) - pitch
     at = (places - low) / pitch
@@ -172,23 +173,23 @@ def solid_noise(places: Floats, pitch: float, random: np.random.Generator) -> Fl
 
 
 def ears(face: Face) -> Floats:
-    """0 to 1 on the ears."""
+    """Mask of the ears, 0 to 1."""
     near = np.hypot((face.y + 0.12) / 0.42, (face.z + 0.95) / 0.36)
     return np.asarray(smooth(0.72, 0.80, face.aside) * (1 - smooth(0.8, 1.2, near)))
 
 
 def forehead(face: Face) -> Floats:
-    """0 to 1 from the brows to the hair."""
+    """Mask of the forehead from the brows to the hair, 0 to 1."""
     up = smooth(0.16, 0.34, face.y) * (1 - smooth(0.75, 0.95, face.y))
     return np.asarray(up * smooth(-0.75, -0.3, face.z))
 
 
 def blood(face: Face, age: int) -> Floats:
-    """How much more blood a place has than the mean, 1 for a blush.
+    """Blood relative to the mean of the face, 1 for a blush.
 
     Args:
         face: the vertices.
-        age: years; a child's cheeks are redder, an old nose is.
+        age: years; children have redder cheeks, old people redder noses.
     """
     young = np.interp(age, (8, 25), (1.2, 1.0))
     old = np.interp(age, (40, 75), (1.0, 1.5))
@@ -211,7 +212,8 @@ def blood(face: Face, age: int) -> Floats:
 
 
 def shade_of_eyes(face: Face) -> Floats:
-    """0 to 1 under the eyes, where veins show: from the inner corner along the socket's rim."""
+    """Mask of the dark skin under the eyes, where veins show, 0 to 1: from the inner corner
+    outward."""
     along = np.clip((face.aside - 0.13) / 0.30, 0, 1)
     rim = -0.15 - 0.075 * np.sin(np.pi * np.clip(along * 0.9 + 0.05, 0, 1))
     away = np.abs(face.y - rim) / 0.062
@@ -228,7 +230,7 @@ def yellow(face: Face) -> Floats:
 
 
 def beard(face: Face) -> Floats:
-    """How thick a beard's roots stand, 0 to 1; its edge is loose."""
+    """Density of the beard's roots, 0 to 1, with a loose edge."""
     x, y, z = face.aside, face.y, face.z
     line = np.interp(
         x, (0.0, 0.17, 0.3, 0.45, 0.6, 0.72), (-0.53, -0.56, -0.70, -0.66, -0.45, -0.2)
@@ -243,7 +245,7 @@ def beard(face: Face) -> Floats:
 
 
 def pores(face: Face) -> Floats:
-    """How large pores are, 0 to 1: on the nose and beside it most."""
+    """Size of the pores, 0 to 1; largest on and beside the nose."""
     front = smooth(0.08, 0.2, face.z)
     nose = np.exp(-((face.aside / 0.17) ** 2) - ((face.y + 0.36) / 0.2) ** 2) * front
     cheeks = face.spot(0.28, -0.36, 0.17, 0.17)
@@ -252,7 +254,7 @@ def pores(face: Face) -> Floats:
 
 
 def oil(face: Face) -> Floats:
-    """How much the skin shines, 0 to 1: forehead, nose, chin, lids."""
+    """How much the skin shines, 0 to 1: forehead, nose, chin and lids."""
     front = smooth(0.08, 0.2, face.z)
     nose = np.exp(-((face.aside / 0.14) ** 2) - ((face.y + 0.3) / 0.24) ** 2) * front
     brow = forehead(face) * np.exp(-((face.aside / 0.32) ** 2))
@@ -261,7 +263,7 @@ def oil(face: Face) -> Floats:
 
 
 def freckled(face: Face) -> Floats:
-    """Where the sun makes freckles, 0 to 1: nose, cheeks, less the forehead."""
+    """Where the sun makes freckles, 0 to 1: nose, cheeks, and less on the forehead."""
     nose = face.spot(0, -0.24, 0.2, 0.13)
     cheeks = face.spot(0.36, -0.3, 0.2, 0.16)
     return np.asarray(
@@ -271,6 +273,6 @@ def freckled(face: Face) -> Floats:
 
 
 def weathered(face: Face) -> Floats:
-    """Where age leaves spots, 0 to 1: temples, brow, the outer cheeks, the scalp."""
+    """Where age leaves spots, 0 to 1: temples, forehead, outer cheeks, scalp."""
     sides = face.spot(0.6, 0.1, 0.25, 0.35) + face.spot(0.55, -0.35, 0.2, 0.25)
     return np.asarray(np.clip(sides + 0.6 * forehead(face) + smooth(0.7, 1.0, face.y), 0, 1))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The colour of the skin: pigment and blood over a person's own tone.
+"""The colour of the skin: pigment and blood over the person's own tone.
 
-What lies in the skin takes light away by its own curve, so amounts of pigment and blood are added
-and the colour is the tone times exp(-amounts): a blush on dark skin stays darker than on light.
+Each pigment absorbs light by its own curve, so the amounts add up and the colour is tone *
+exp(-amounts). A blush on dark skin is therefore darker than on light skin.
 """
 
 from __future__ import annotations
@@ -19,36 +19,37 @@ from .places import HAIRLINES, beard_density, brow_density, hairline_height, thi
 from .raster import Raster
 
 HEAD_SIZE = 2048
-# How much of linear red, green and blue one unit takes.
+# Absorption of linear red, green and blue by one unit.
 _MELANIN = np.array([0.42, 0.70, 1.0], np.float32)
 _VEINS = np.array([0.42, 0.26, 0.10], np.float32)
 _YELLOW = np.array([-0.02, 0.04, 0.36], np.float32)
 _MUCOSA = (0.73, 0.41, 0.385)
-_IN_SHADE = 0.55  # how light hair is at its roots, beside its tips
+_IN_SHADE = 0.55  # brightness of hair at its roots relative to its tips
 _THROAT = (0.36, 0.15, 0.14)
 _LID_MARGIN = (0.54, 0.29, 0.26)
 
 
 def linear(colour: Floats) -> Floats:
-    """Linear light of sRGB."""
+    """Linear light from sRGB."""
     c = np.asarray(colour, np.float32)
     return np.asarray(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4), np.float32)
 
 
 def encoded(light: Floats) -> Floats:
-    """sRGB of linear light."""
+    """sRGB from linear light."""
     c = np.clip(light, 0, 1)
     return np.asarray(np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055))
 
 
 def depth_of(person: Person) -> float:
-    """How dark a person's skin is, 0 to 1."""
+    """Darkness of a person's skin, 0 to 1."""
     light = float(linear(np.array(person.skin)) @ [0.21, 0.72, 0.07])
     return float(smooth(0.42, 0.06, np.array(light)))
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
-    """float64[V]: how far inside the hairline, decimetres; less where hair is thin; not on ears."""
+    """Distance inside the hairline, float64[V], decimetres; less where hair is thin; not on
+    ears."""
     at = np.column_stack([face.x, face.y, face.z])
     inside = hairline_height(at, *HAIRLINES[person.hair_style])
     ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))
@@ -57,7 +58,7 @@ def _hairline(face: regions.Face, person: Person) -> Floats:
 
 
 def _grown_beard(face: regions.Face, person: Person) -> Floats:
-    """float64[V], 0 to 1: where a beard's cards stand."""
+    """Mask of the beard's cards, float64[V], 0 to 1."""
     if person.beard_style == "none":
         return np.zeros(len(face.x))
     at = np.column_stack([face.x, face.y, face.z])
@@ -65,13 +66,13 @@ def _grown_beard(face: regions.Face, person: Person) -> Floats:
 
 
 class Texels:
-    """The texels of a head that are covered: where they are, and patterns laid over them.
+    """The covered texels of a head: their places, and patterns laid over them.
 
     Attributes:
-        raster: of the texture.
+        raster: raster of the texture.
         place: float32[n, 3], decimetres.
-        step: float32[n, 2], how long a texel is across and up, decimetres.
-        scale: texels of this texture to one of HEAD_SIZE.
+        step: float32[n, 2], width and height of each texel on the surface, decimetres.
+        scale: texels of this texture per texel of HEAD_SIZE.
     """
 
     def __init__(self, raster: Raster, positions: Floats) -> None:
@@ -83,12 +84,12 @@ class Texels:
         self.side = max(64, self.size // 2)
 
     def mottling(self, width: float, seed: int, high: float | None = None) -> Floats:
-        """float32[n]: noise of deviation 1.
+        """Noise with deviation 1, float32[n].
 
         Args:
-            width: of its spots, texels of HEAD_SIZE.
-            seed: gives the spots.
-            high: of its spots; None: as wide.
+            width: width of its spots, texels of HEAD_SIZE.
+            seed: seed of the spots.
+            high: height of its spots; None: the same as `width`.
         """
         random = np.random.default_rng(seed)
         tall = None if high is None else high * self.scale
@@ -96,42 +97,42 @@ class Texels:
         return np.asarray(tile.ravel()[self.at(seed)])
 
     def dots(self, cell: float, seed: int) -> tuple[patterns.Dots, Ints]:
-        """Dots, and int[n], where on their tile each texel is.
+        """Dots, and the place of each texel on their tile, int[n].
 
         Args:
-            cell: side of a dot's cell, texels of HEAD_SIZE.
-            seed: gives the dots.
+            cell: side of a cell, texels of HEAD_SIZE.
+            seed: seed of the dots.
         """
         tile = patterns.dots(self.side, cell * self.scale, np.random.default_rng(seed))
         return tile, self.at(seed)
 
     def at(self, seed: int) -> Ints:
-        """int[n]: where on a tile each texel is.
+        """The place of each texel on a tile, int[n].
 
         Args:
-            seed: of the tile, so that two do not begin together.
+            seed: chooses the tile's offset, so that two tiles do not start together.
         """
         shift = (37 * seed * self.side // 100, 53 * seed * self.side // 100)
         return patterns.laid(self.raster.where, self.size, self.side, shift)
 
     @cached_property
     def coarse(self) -> Floats:
-        """float32[n]: spots of half a centimetre."""
+        """Mottling of half a centimetre, float32[n]."""
         return self.mottling(26, 1)
 
     @cached_property
     def middle(self) -> Floats:
-        """float32[n]: spots of two millimetres."""
+        """Mottling of two millimetres, float32[n]."""
         return self.mottling(9, 2)
 
     @cached_property
     def fine(self) -> Floats:
-        """float32[n]: spots of half a millimetre."""
+        """Mottling of half a millimetre, float32[n]."""
         return self.mottling(2.6, 3)
 
 
 class Skin:
-    """The fields of a face at its texels, float32[n] each, and what they are coloured with."""
+    """The fields of a face at its texels, float32[n] each, and the person's colours."""
 
     def __init__(self, person: Person, face: regions.Face, texels: Texels, eye: Floats) -> None:
         self.person, self.texels, self.eye = person, texels, eye
@@ -163,10 +164,10 @@ class Skin:
         self.scalp = smooth(-0.01, 0.17, self.field["hairline"] + uneven)
 
     def colour(self, creases: Floats) -> Floats:
-        """float32[n, 3], sRGB.
+        """The colour, float32[n, 3], sRGB.
 
         Args:
-            creases: float32[n], how deep in a fold a texel is, 0 to 1.
+            creases: float32[n], depth of each texel in a fold, 0 to 1.
         """
         person, tone = self.person, linear(np.array(self.person.skin))
         blush = np.log(tone / np.maximum(linear(np.array(person.flush)), 1e-3))
@@ -196,7 +197,7 @@ class Skin:
         return np.asarray(out)
 
     def _vessels(self) -> Floats:
-        """Fine vessels that show on old, light cheeks and noses."""
+        """Fine vessels on old, light cheeks and noses."""
         amount = self.old * (1 - self.deep)
         if amount <= 0:
             return np.zeros(1, np.float32)
@@ -206,7 +207,7 @@ class Skin:
         return np.asarray(0.5 * amount * there * lines * np.clip(self.texels.coarse, 0, 1.5))
 
     def _spots(self) -> Floats:
-        """Freckles, spots of age and moles."""
+        """Freckles, age spots and moles."""
         field, texels, person = self.field, self.texels, self.person
         out = np.zeros(len(texels.place), np.float32)
         bent = 0.05 * texels.middle
@@ -228,17 +229,17 @@ class Skin:
         return out
 
     def _hair(self, light: Floats) -> Floats:
-        """The roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
+        """Roots of beard, brows and hair: their shadow in the skin, and stubble as dots."""
         person, texels = self.person, self.texels
         hair = linear(np.array(person.hair))
         scalp = self.scalp
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
-        # Where hair parts one looks between hairs, and each of them takes a share of the light.
+        # Where hair parts, light passes between the hairs, and each hair absorbs a share.
         deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
         light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
-        if person.beard_style != "none":  # its roots, between the cards
+        if person.beard_style != "none":  # roots between the cards
             share = np.clip(self.field["grown"] * (1 + 0.25 * texels.coarse), 0, 1)
             dark = roots.over(0.9 * share, at, 0.5)
             light = _over(light, _IN_SHADE * hair, 0.5 * share + 0.4 * share * dark)
@@ -253,7 +254,7 @@ class Skin:
         return light
 
     def _brows(self) -> Floats:
-        """float32[n], 0 to 1: where their cards stand, its edge frayed."""
+        """Mask of the brows' cards with a frayed edge, float32[n], 0 to 1."""
         texels = self.texels
         at = texels.place - np.array([0, *self.eye[1:]])
         near = np.flatnonzero((at[:, 1] > 0) & (at[:, 1] < 0.4) & (at[:, 2] > -0.4))
@@ -263,7 +264,8 @@ class Skin:
         return out
 
     def _lips(self, light: Floats) -> Floats:
-        """Their red: pale and pigmented at the rim, lines across, darker where they meet."""
+        """The red of the lips: pale and pigmented at the rim, with lines across, darker where they
+        meet."""
         person, texels, ring = self.person, self.texels, self.field["mouth"]
         if not (ring < regions.FAR_RINGS).any():
             return light
@@ -284,7 +286,7 @@ class Skin:
 
     @cached_property
     def lines(self) -> Floats:
-        """float32[n]: the lips' own lines, across them, mean 0 and deviation 1."""
+        """Lines across the lips, float32[n], mean 0 and deviation 1."""
         texels = self.texels
         tile = patterns.mottling(512, 2.3, np.random.default_rng(41), 14)
         across = np.rint(texels.place[:, 0] / 0.0042 + 1.5 * texels.middle).astype(int) % 512
@@ -292,7 +294,7 @@ class Skin:
         return np.asarray(tile[down, across])
 
     def _inside(self, light: Floats) -> Floats:
-        """The mouth's inside and what lies behind the lids: wet, and never skin."""
+        """The inside of the mouth and the skin behind the lids: wet, and never outer skin."""
         ring, texels = self.field["mouth"], self.texels
         mucosa = linear(np.array(_MUCOSA)) * (1 - 0.25 * self.deep)
         mucosa = mucosa * np.exp(-0.16 * (texels.coarse + texels.middle)[:, None] * [0.3, 1.0, 0.9])
@@ -304,7 +306,7 @@ class Skin:
 
 
 def _over(light: Floats, colour: Floats, mask: Floats) -> Floats:
-    """A colour laid over another where a mask says, linear."""
+    """Lay a colour over linear light by a mask."""
     mask = np.clip(mask, 0, 1).astype(np.float32)[:, None]
     out = np.asarray(light * (1 - mask))
     out += colour.astype(np.float32) * mask

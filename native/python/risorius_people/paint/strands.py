@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The hairs on the cards of scalp, brows, lashes and beard: colour and opacity in one picture."""
+"""The hairs on the cards of scalp, brows, lashes and beard: colour and opacity in one texture."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from ..polygons import Floats
 from .atlas import ATLAS_SIZE, DENSE, TILES
 
 _GREY = (0.74, 0.73, 0.71)
-_LASH_DARK = 0.3  # of the brows' colour
+_LASH_DARK = 0.3  # factor on the brows' colour
 _LOOSE = 0.6
-_CURLY = 0.6  # hair_curl from which on hairs are not seen one by one
+_CURLY = 0.6  # hair_curl above which single hairs are not visible
 
 
 @dataclass
 class _Hairs:
-    """How the hairs of a kind of tile are.
+    """How the hairs of a kind of tile look.
 
     Attributes:
-        counts: in the tiles, one after the other.
-        thick: half a hair at its root, texels, least and most.
-        length: of the tile's height, least and most.
-        begin: of the tile's height, where roots lie at most.
-        lean: how far hairs lean aside, of the tile's width.
-        bend: how far they bend.
-        wave: how far they wave, of the tile's width.
-        waves: over the length.
-        gather: how far tips come together in the middle, 0 to 1.
-        taper: where a hair begins to get thinner, of its length.
-        loose: how much fewer stand at the edges than in the middle, 0 to 1: where hairs stand
-            evenly, one sees that a card is a rectangle.
+        counts: number of hairs in each tile.
+        thick: half width of a hair at its root, texels, smallest and largest.
+        length: shares of the tile's height, smallest and largest.
+        begin: largest height of the roots, as a share of the tile's height.
+        lean: sideways lean, as a share of the tile's width.
+        bend: sideways bend, as a share of the tile's width.
+        wave: amplitude of the waves, as a share of the tile's width.
+        waves: number of waves over the length.
+        gather: how far tips gather in the middle, 0 to 1.
+        taper: where a hair begins to taper, as a share of its length.
+        loose: how much sparser hairs are at the edges than in the middle, 0 to 1. With even hairs
+            the card shows as a rectangle.
     """
 
     counts: tuple[int, ...]
@@ -51,7 +51,7 @@ class _Hairs:
 
 def _kinds(person: Person) -> dict[str, _Hairs]:
     curl = person.hair_curl
-    straight = curl < _CURLY  # hairs side by side are seen one by one, and have to be thin
+    straight = curl < _CURLY  # single hairs are visible side by side and must be thin
     thin = (0.8, 1.35) if straight else (1.0, 1.7)
     wave, waves = 0.16 * curl, 1.5 + 7.0 * curl
     long = person.hair_style in ("long", "bun")
@@ -80,9 +80,9 @@ def _kinds(person: Person) -> dict[str, _Hairs]:
 
 
 def _shades(colour: Colour, grey: float, count: int, random: np.random.Generator) -> Floats:
-    """float64[count, 3]: colours of single hairs."""
+    """Colours of single hairs, float64[count, 3]."""
     own = np.array(colour) * random.uniform(0.78, 1.28, (count, 1))
-    own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some are redder
+    own = own + random.normal(0, 0.012, (count, 1)) * [1.2, 0.6, 0.2]  # some hairs are redder
     white = np.array(_GREY) * random.uniform(0.55, 1.0, (count, 1))
     return np.asarray(np.where(random.random((count, 1)) < grey, white, own))
 
@@ -95,7 +95,8 @@ def _paint_tile(
     grey: float,
     random: np.random.Generator,
 ) -> Floats:
-    """float64[height, width, 4]: hairs from the root (row 0) to the tip, later ones on top."""
+    """A tile of hairs from the root (row 0) to the tip, later ones on top, float64[height, width,
+    4]."""
     width, height = size
     image = np.zeros((height, width, 4))
     v = (np.arange(height) + 0.5) / height
@@ -106,14 +107,15 @@ def _paint_tile(
     places = (np.arange(count) + random.uniform(0.1, 0.9, count)) / count
     off = 2 * places - 1
     places = 0.5 + 0.5 * np.sign(off) * np.abs(off) ** (1 + hairs.loose)
-    aside = 0.05 + hairs.wave  # a curl that left the tile would be cut off in a straight line
+    aside = 0.05 + hairs.wave  # a curl beyond the tile would be cut in a straight line
     for place, shade in zip(random.permutation(places), shades, strict=True):
         begin = random.uniform(0, hairs.begin)
         length = begin + (1 - begin) * random.uniform(*hairs.length)
         s = np.clip((v - begin) / (length - begin), 0, 1)
         lean, bend = random.normal(0, hairs.lean), random.normal(0, hairs.bend)
         start = aside + (1 - 2 * aside) * place
-        if abs(start + lean + bend - 0.5) > 0.5 - aside:  # it would be cut off in a straight line
+        # The tile's edge would cut it in a straight line.
+        if abs(start + lean + bend - 0.5) > 0.5 - aside:
             lean, bend = -lean, -bend
         middle = start + lean * s + bend * s**2
         middle = middle + hairs.gather * s * (0.5 - middle)
@@ -135,10 +137,10 @@ def _lay(
 
     Args:
         image: float64[h, w, 4], is changed.
-        middle: float64[h], its column by row.
-        half: float64[h], half its width; 0 where it is not.
+        middle: float64[h], column of the hair in each row.
+        half: float64[h], half its width; 0 in rows without the hair.
         shade: float64[3].
-        along: float64[h], 0 at its root, 1 at its tip.
+        along: float64[h], 0 at the root, 1 at the tip.
         strength: opacity.
     """
     width = image.shape[1]
@@ -159,10 +161,10 @@ def _lay(
 
 
 def paint_strands(person: Person) -> Floats:
-    """float64[ATLAS_SIZE, ATLAS_SIZE, 4]: sRGB colour and opacity of the person's hairs.
+    """sRGB colour and opacity of the person's hairs, float64[ATLAS_SIZE, ATLAS_SIZE, 4].
 
     Args:
-        person: has the colours, how curly hair is, and how much of it is grey.
+        person: has the colours, the curl and the share of grey hair.
     """
     random = np.random.default_rng(11)
     image = np.zeros((ATLAS_SIZE, ATLAS_SIZE, 4))

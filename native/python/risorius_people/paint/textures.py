@@ -23,20 +23,22 @@ from .relief import heights, normals, roughness
 from .skin import HEAD_SIZE, Skin, Texels
 
 MASK_SIZE = 512
-WRINKLE_SHARE = 2  # a texel of the sets is as wide as so many of the colour
-STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))  # of each fold, by years, in a face at rest
-_FROWN_ENDS = (0.17, 0.27)  # decimetres over the eyes: higher up its lines would cross the brow's
+WRINKLE_SHARE = 2  # a texel of the wrinkle sets is this many texels of the colour wide
+# Years, and the share of each fold that stays in the face at rest.
+STAYS = ((25, 40, 58, 75), (0.0, 0.06, 0.2, 0.38))
+# Decimetres above the eyes: higher up its lines would cross the lines of the forehead.
+_FROWN_ENDS = (0.17, 0.27)
 
 
 def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
-    """float64[h, w]: how deep folds are, less on the fat of the cheeks, which bulges instead.
+    """Depth of folds, float64[h, w]; less on the fat of the cheeks, which bulges instead.
 
     Args:
         person: has the age.
-        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        place: float64[h, w, 3], place of each texel on the head, decimetres.
         eye: float64[3], the left eye's middle.
     """
-    # Of a face of eight they are a third as deep as at thirty, at eighty nearly twice.
+    # At 8 years folds are a third as deep as at 30; at 80 nearly twice.
     age = float(np.interp(person.age, (8, 30, 80), (0.35, 1.0, 1.9)))
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
     cheek = np.exp(-(((x - 0.44) / 0.19) ** 2) - ((y + 0.42) / 0.24) ** 2)
@@ -46,10 +48,11 @@ def fold_strength(person: Person, place: Floats, eye: Floats) -> Floats:
 
 
 def lasting(place: Floats, eye: Floats) -> Floats:
-    """float64[h, w]: where folds of expressions stay with the years, 0 to 1: brow and eyes first.
+    """How strongly folds of expressions stay with age, float64[h, w], 0 to 1: most at brow and
+    eyes.
 
     Args:
-        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        place: float64[h, w, 3], place of each texel on the head, decimetres.
         eye: float64[3], the left eye's middle.
     """
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
@@ -61,10 +64,11 @@ def lasting(place: Floats, eye: Floats) -> Floats:
 
 
 def between_brows(place: Floats, eye: Floats) -> Floats:
-    """float64[h, w]: where a frown's lines stay alone, 0 to 1: lines across them would be a grid.
+    """Mask of the frown's own lines, float64[h, w], 0 to 1: other lines across them would form a
+    grid.
 
     Args:
-        place: float64[h, w, 3], each texel's place on the head, decimetres.
+        place: float64[h, w, 3], place of each texel on the head, decimetres.
         eye: float64[3], the left eye's middle.
     """
     x, y = np.abs(place[:, :, 0]), place[:, :, 1] - eye[1]
@@ -73,12 +77,12 @@ def between_brows(place: Floats, eye: Floats) -> Floats:
 
 @dataclass
 class Wrinkles:
-    """What expressions fold.
+    """Textures of the folds of expressions.
 
     Attributes:
-        pictures: of masks and of the sets' normals, by file name.
+        pictures: masks and normals of the sets, by file name.
         sets: the file of each set.
-        still: float32[h, w], how deep in a fold a texel of the face at rest is, 0 to 1.
+        still: float32[h, w], depth of each texel in a fold of the face at rest, 0 to 1.
     """
 
     pictures: dict[str, Floats]
@@ -94,14 +98,14 @@ def head_wrinkles(
     units: dict[str, Expression],
     size: int,
 ) -> Wrinkles:
-    """Pictures of masks and of the sets' normals, which are differences from flat ones.
+    """Masks, and normals of the sets; the normals are differences from flat ones.
 
     Args:
         person: has the age.
         head: the mesh, not subdivided.
         positions: float64[v, 3] of its vertices, decimetres.
         eye: float64[3], the left eye's middle.
-        units: what each raw control does, by its name.
+        units: expression of each raw control, by name.
         size: texels of a side.
     """
     uvs = head.polygons.uvs
@@ -152,12 +156,12 @@ def paint_head(
 
     Args:
         person: has the colours and the age.
-        head: the mesh, each edge of the base mesh two.
+        head: the mesh, with each edge of the base mesh split in two.
         positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
-        own: the same on the person, whose form the relief has.
+        own: float64[V, 3], the same on the person; the relief shows this form.
         eye: float64[3], the left eye's middle.
-        units: what each raw control does, by its name.
-        still: float32[h, w], how deep in a fold a texel is, in a smaller picture.
+        units: expression of each raw control, by name.
+        still: float32[h, w], depth of each texel in a fold, in a smaller texture.
         size: texels of a side.
     """
     p = head.carry(positions)
@@ -178,7 +182,7 @@ def paint_head(
 
 
 def flush_masks(head: Part, positions: Floats, eye: Floats) -> dict[str, Floats]:
-    """Where a cheek reddens, by file name.
+    """Masks of the blushing cheeks, by file name.
 
     Args:
         head: the mesh, not subdivided.
@@ -208,15 +212,15 @@ def paint_textures(
     Args:
         person: has the colours.
         positions: float64[V, 3], all vertices of the base mesh on the man, decimetres.
-        own: the same on the person.
-        units: what each raw control does, by its name.
+        own: float64[V, 3], the same on the person.
+        units: expression of each raw control, by name.
         parts: the meshes.
-        largest: no texture has more texels than a square of this side.
+        largest: each texture has at most largest * largest texels.
 
     Returns:
-        File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name;
-        the roles are color, normal, roughness, normal:<set of wrinkles>, and
-        map:<animated map>, a mask of where that map shows.
+        File name -> bytes of a PNG; and metadata for the DNA: texture:<mesh>:<role> -> file name.
+        The roles are color, normal, roughness, normal:<wrinkle set>, and map:<animated map>, the
+        mask of that map.
     """
     coarse = next(part for part in parts if part.name == "head_lod1_mesh")
     eye_parts = [part for part in parts if part.name.startswith("eyeLeft")]
@@ -249,18 +253,19 @@ def paint_textures(
 
 
 def packable(name: str, image: Floats, largest: int) -> Floats:
-    """A picture at the size at which it is kept.
+    """A texture at its stored size and precision.
 
-    Half as many texels a side do for an eye as for a head. Where the zip is to hold them, pictures
-    keep seven bits and roughness six: what PNG cannot pack is the noise of the others.
+    Eyes need half the head's side. Small textures go into the zip: they keep seven bits, roughness
+    six, because PNG cannot compress the noise of the remaining bits.
 
     Args:
-        name: of its file.
+        name: file name.
         image: float64[h, w, ...] in [0, 1].
-        largest: no texture has more texels than a square of this side.
+        largest: each texture has at most largest * largest texels.
     """
     out = shrunk(image, largest // 2 if name.startswith("eye") else largest)
     if largest > 1024 or not name.startswith(("head_", "eye_")):
         return out
-    steps = 63.75 if "roughness" in name else 127.5  # of both 128 of 255, a flat normal, is one
+    # Both map 128 of 255, a flat normal, to a whole step.
+    steps = 63.75 if "roughness" in name else 127.5
     return np.round(out * steps) / steps

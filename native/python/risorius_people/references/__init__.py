@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The joints that all sample people share, found on the man once: joints.npz, made by
-packaging/ship/find_joints.py, has those of the people as they come; others are kept among the
-user's caches."""
+"""The joints that all sample people share, fitted once on the man. joints.npz, made by
+packaging/ship/find_joints.py, has the joints of the shipped people; others are kept in the user's
+cache."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ SHIPPED = Path(__file__).with_name("joints.npz")
 
 
 def shipped() -> Reference:
-    """The reference of build.RIG, which comes along."""
+    """The reference of build.RIG, which ships with the package."""
     return Reference.read(SHIPPED)
 
 
 def _path(options: RigOptions) -> Path:
-    """Its name begins alike for one version of what it depends on."""
+    """File of a reference; the start of its name is the same for one version of all inputs."""
     known = hashlib.sha256(SHA256.encode() + fingerprint())
     for entry in sorted(Path(__file__).parent.rglob("*")):
         if entry.suffix in (".py", ".toml"):
@@ -35,10 +35,10 @@ def _path(options: RigOptions) -> Path:
 
 
 def kept(options: RigOptions) -> Reference | None:
-    """The reference of these options, if this version of Risorius has made one here.
+    """The reference of these options, if this version of Risorius made one on this machine.
 
     Args:
-        options: of the joint rig.
+        options: options of the joint rig.
     """
     try:
         return Reference.read(_path(options))
@@ -47,11 +47,11 @@ def kept(options: RigOptions) -> Reference | None:
 
 
 def keep(options: RigOptions, reference: Reference) -> None:
-    """Keeps a reference, in place of those of other versions; where it cannot, it is made again.
+    """Keep a reference and remove other versions; if that fails, the next build makes it again.
 
     Args:
-        options: of the joint rig.
-        reference: of the man.
+        options: options of the joint rig.
+        reference: the man's reference.
     """
     path = _path(options)
     with contextlib.suppress(OSError):

@@ -8,6 +8,7 @@ and solves place, size and parts together (Gauss-Newton; parts as likely as the 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -123,7 +124,10 @@ class Step:
     expressions: bool = True
 
 
-PLACE = (Step(8, 4.0, 260, 0, expressions=False),)
+PLACE = (
+    Step(3, 4.0, 200, 0, expressions=False),
+    Step(6, 4.0, 300, 0, expressions=False),
+)
 ROUGH = (Step(6, 2.0, 500, 6, 4.0), Step(6, 1.2, 700, 14, 3.0))
 FINE = (
     Step(6, 0.9, 1600, 24, 2.0, 0.4),
@@ -132,7 +136,13 @@ FINE = (
 )
 
 
-def fit(target: Target, pose: Pose, steps: tuple[Step, ...], held: Held | None = None) -> Pose:
+def fit(
+    target: Target,
+    pose: Pose,
+    steps: tuple[Step, ...],
+    held: Held | None = None,
+    weights: Doubles | None = None,
+) -> Pose:
     """A form laid onto a surface, from a pose that is near.
 
     Args:
@@ -140,10 +150,17 @@ def fit(target: Target, pose: Pose, steps: tuple[Step, ...], held: Held | None =
         pose: to begin with; it stays as it is.
         steps: one after the other.
         held: vertices of the form whose places are known.
+        weights: float64[V], how much each vertex of the form says; None: as the form has it.
     """
     form = head_form()
+    if weights is not None:
+        form = replace(form, weights=weights)
     for step in steps:
-        chosen = _chosen(form, step.vertices)
+        chosen = (
+            _chosen(form, step.vertices)
+            if weights is None
+            else np.flatnonzero(weights[: form.skin])
+        )
         for _ in range(step.rounds):
             pose = _round(form, target, pose, step, chosen, held)
     return pose
@@ -177,19 +194,54 @@ def _chosen(form: HeadForm, count: int) -> Ints:
     return np.flatnonzero(np.diff(np.floor(steps), prepend=-1.0) > 0)
 
 
-def form_normals(form: HeadForm, points: Doubles) -> Doubles:
-    """float64[skin, 3], normals of a form of these points."""
-    return Surface(points, form.triangles).normals()[: form.skin]
+def form_normals(form: HeadForm, shaped: Doubles) -> Doubles:
+    """float64[skin, 3], normals of a form in its own space.
+
+    Args:
+        form: its triangles count.
+        shaped: float64[V, 3].
+    """
+    a, b, c = (shaped[form.triangles[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    order, first = _around()
+    out = np.add.reduceat(across[order // 3], first, axis=0)
+    return np.asarray(out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-300))
+
+
+@cache
+def _around() -> tuple[Ints, Ints]:
+    """Corners of triangles in the order of their vertices, and where each vertex begins."""
+    flat = head_form().triangles.ravel()
+    order = np.argsort(flat, kind="stable")
+    return order, np.searchsorted(flat[order], np.arange(head_form().skin))
+
+
+@cache
+def _mean_normals() -> Doubles:
+    return form_normals(head_form(), head_form().mean)
+
+
+def pose_normals(form: HeadForm, pose: Pose, shaped: Doubles) -> Doubles:
+    """float64[skin, 3], normals of a form in the surface's space.
+
+    Args:
+        form: the model.
+        pose: of it.
+        shaped: float64[V, 3], the form that the pose has.
+    """
+    as_mean = not pose.parts.any() and not pose.expressions.any()
+    normals = _mean_normals() if as_mean else form_normals(form, shaped)
+    return np.asarray(normals @ pose.rotation.T)
 
 
 def _round(
     form: HeadForm, target: Target, pose: Pose, step: Step, chosen: Ints, held: Held | None
 ) -> Pose:
     shaped = form.shaped(pose.parts, pose.expressions)
-    placed = pose.place(shaped)
-    normals = form_normals(form, placed)[chosen]
+    placed = pose.place(shaped[chosen])
+    normals = pose_normals(form, pose, shaped)[chosen]
     found, near, across = target.pairs(
-        placed[chosen], normals, step.least_cosine, 3.0 * step.reach * pose.scale
+        placed, normals, step.least_cosine, 3.0 * step.reach * pose.scale
     )
     used = chosen[found]
     if len(used) < 30:
@@ -249,7 +301,7 @@ class _System:
     def solved(self, pose: Pose) -> Pose:
         """The pose after the step."""
         values = np.concatenate([pose.parts[: self.parts], pose.expressions[: self.more]])
-        hold = np.full(len(values), self.step.prior)
+        hold = np.full(len(values), float(self.step.prior))
         hold[self.parts :] *= 4.0  # an expression of 0.5 is as seldom as a part of 1
         at = np.arange(7, 7 + len(values))
         self.left[at, at] += hold

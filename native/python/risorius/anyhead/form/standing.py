@@ -10,12 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
-from .fitting import FINE, PLACE, ROUGH, Held, Pose, Target, fit, form_normals
+from ..surface import Surface
+from .fitting import FINE, PLACE, ROUGH, Held, Pose, Target, fit, pose_normals
 from .heads import HeadForm, head_form
 
 TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
 _SHARES = (1.0, 0.72, 0.5, 0.32, 0.2, 0.13)  # of the surface's height that the head may have
-_KEPT, _TRIED = 10, 4  # guesses that go on to the next stage
+_PLACED, _KEPT, _TRIED = 48, 10, 3  # guesses that go on to the next stage
+_WORSE = 1.6  # a guess so much worse than the best one is none
+_OBLIQUE = 48
+SURE, NO_FACE = 0.13, 0.21  # errors up to which a head is one, and from which it is none
+_GRIDS = (400, 280, 200, 140, 100, 70, 50)  # cells along the longest side
+_CELLS = 9000
 _FAR = 1.5  # cm of the form: farther counts as this far
 
 
@@ -25,7 +31,7 @@ class Standing:
 
     Attributes:
         pose: of the form.
-        error: mean distance of the middle of the face, cm of the form; _FAR at most.
+        error: see `misfit`, and a little for parts that are seldom; cm of the form.
     """
 
     pose: Pose
@@ -73,7 +79,9 @@ def guesses(points: Doubles, turn: Doubles, shares: Sequence[float] = _SHARES) -
 
 
 def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> float:
-    """Mean distance of the middle of the face from a surface, cm of the form.
+    """How far three quarters of the middle of the face are from a surface at most, cm of the form.
+
+    Holes, hair and inner sides take what is left of it.
 
     Args:
         target: the surface.
@@ -83,16 +91,16 @@ def misfit(target: Target, pose: Pose, form: HeadForm, count: int = 900) -> floa
     """
     face = np.flatnonzero(form.weights[: form.skin] > 0.6)
     face = face[:: max(1, len(face) // count)]
-    points = pose.points(form)
-    normals = form_normals(form, points)[face]
-    found, near, _ = target.pairs(points[face], normals, 0.5, 2 * _FAR * pose.scale)
-    away = np.linalg.norm(points[face] - near, axis=1) / pose.scale
-    return float(np.where(found, np.minimum(away, _FAR), _FAR).mean())
+    shaped = form.shaped(pose.parts, pose.expressions)
+    normals, points = pose_normals(form, pose, shaped)[face], pose.place(shaped[face])
+    found, near, _ = target.pairs(points, normals, 0.5, 2 * _FAR * pose.scale)
+    away = np.linalg.norm(points - near, axis=1) / pose.scale
+    return float(np.quantile(np.where(found, np.minimum(away, _FAR), _FAR), 0.75))
 
 
 def _strange(pose: Pose) -> float:
     """How unlikely the parts of a form are, cm: what a fit pays for them."""
-    return 0.004 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
+    return 0.02 * float(np.sqrt((pose.parts**2).mean())) + 0.01 * float(pose.expressions.sum())
 
 
 def find_standing(
@@ -108,15 +116,70 @@ def find_standing(
         up, front: float64[3], where it has them; None: anywhere.
         held: vertices of the form whose places are known.
     """
+    coarse = Target(coarsened(target.surface))
+    best = _best(target, coarse, turns(up, front), held)
+    if best[0].error > SURE and up is None and front is None:
+        best = sorted(best + _best(target, coarse, oblique(), held), key=lambda s: s.error)
+    return best
+
+
+def oblique() -> list[Doubles]:
+    """float64[3, 3] each: turns spread evenly over all there are (Alexa 2022)."""
+    k = np.arange(_OBLIQUE) + 0.5
+    share = k / _OBLIQUE
+    a, b = 2 * np.pi * k / 2**0.5, 2 * np.pi * k / 1.533751168755204288118041
+    quarter = np.stack(
+        [
+            np.sqrt(share) * np.sin(a), np.sqrt(share) * np.cos(a),
+            np.sqrt(1 - share) * np.sin(b), np.sqrt(1 - share) * np.cos(b),
+        ],
+        axis=1,
+    )  # fmt: skip
+    out = []
+    for x, y, z, w in quarter:
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        out.append(np.eye(3) + 2 * w * cross + 2 * cross @ cross)
+    return out
+
+
+def _best(
+    target: Target, coarse: Target, ways: Sequence[Doubles], held: Held | None
+) -> list[Standing]:
+    """The best places of a head that stands in one of several ways, the best first."""
     form = head_form()
-    points = target.surface.points[np.unique(target.surface.triangles)]
-    points = points[:: max(1, len(points) // 20000)]
-    poses = [g for turn in turns(up, front) for g in guesses(points, turn)]
-    rated = _rated(target, [fit(target, pose, PLACE, held) for pose in poses], form, 300)
-    rated = _apart(rated)[:_KEPT]
-    rated = _apart(_rated(target, [fit(target, s.pose, ROUGH, held) for s in rated], form, 900))
-    best = [fit(target, s.pose, FINE, held) for s in rated[:_TRIED]]
+    poses = [g for turn in ways for g in guesses(coarse.surface.points, turn)]
+    rated = _rated(coarse, [fit(coarse, pose, PLACE[:1], held) for pose in poses], form, 200)
+    placed = [fit(coarse, s.pose, PLACE[1:], held) for s in rated[:_PLACED]]
+    rated = _apart(_rated(coarse, placed, form, 300))[:_KEPT]
+    rated = _apart(_rated(coarse, [fit(coarse, s.pose, ROUGH, held) for s in rated], form, 900))
+    rated = [s for s in rated if s.error < _WORSE * rated[0].error][:_TRIED]
+    best = [fit(target, s.pose, FINE, held) for s in rated]
     return _rated(target, best, form, 2000)
+
+
+def coarsened(surface: Surface) -> Surface:
+    """A surface of few vertices: those of a cell of a grid become one.
+
+    Args:
+        surface: it stays as it is.
+    """
+    used = np.unique(surface.triangles)
+    low = surface.points[used].min(axis=0)
+    extent = float(np.ptp(surface.points[used], axis=0).max())
+    for parts in _GRIDS:
+        place = np.floor((surface.points - low) / (extent / parts)).astype(np.int64)
+        key = (place[:, 0] * (parts + 1) + place[:, 1]) * (parts + 1) + place[:, 2]
+        _, back = np.unique(key, return_inverse=True)
+        count = int(back.max()) + 1
+        if count <= _CELLS:
+            break
+    sums = np.stack([np.bincount(back, surface.points[:, k], count) for k in range(3)], axis=1)
+    points = sums / np.bincount(back, minlength=count)[:, None]
+    corners = back[surface.triangles]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    kept = corners[whole]
+    own = np.unique(kept)
+    return Surface(points[own], np.searchsorted(own, kept))
 
 
 def _rated(target: Target, poses: Sequence[Pose], form: HeadForm, count: int) -> list[Standing]:

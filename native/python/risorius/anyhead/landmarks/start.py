@@ -90,3 +90,24 @@ def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> 
     for first in range(0, len(inside), _ROWS):
         out[first : first + _ROWS] = kernel(inside[first : first + _ROWS], begin) @ weights
     return out
+
+
+def pairs_of(template: Surface, one: Found, other: Found) -> list[tuple[int, Doubles]]:
+    """The template's vertex nearest each landmark, and where it belongs on another head.
+
+    What lies between the vertex and the landmark is carried along, so that a coarse template is
+    not pulled by its own edges.
+
+    Args:
+        template: the surface of the one.
+        one: what was found in it.
+        other: what was found in the other head.
+    """
+    names = [n for n in one.landmarks.points if n in other.landmarks.points]
+    places = np.array([one.landmarks.points[n] for n in names]).reshape(-1, 3)
+    vertices = [int(((template.points - place) ** 2).sum(axis=1).argmin()) for place in places]
+    goals = carried(template.points[vertices], one, other)
+    out: dict[int, Doubles] = {}
+    for vertex, goal in zip(vertices, goals, strict=True):
+        out.setdefault(vertex, goal)
+    return list(out.items())

@@ -77,6 +77,8 @@ def join(
     wishes: Wishes,
     edited: Mapping[str, str | list[str]],
     axes: Sequence[str] = ("+x", "+y", "+z"),
+    *,
+    stands: bool = False,
 ) -> Joined:
     """All meshes of a head, as one face.
 
@@ -87,6 +89,7 @@ def join(
         wishes: what is said and not guessed.
         edited: what a person says of names, see matching.assign.
         axes: what sentences call x, y and z, each with its sign.
+        stands: whether the parts stand in the unit already, and none of it is to be guessed.
 
     Raises:
         ShapeFileError: no face, two heads, or wishes that cannot be.
@@ -96,7 +99,12 @@ def join(
         raise ShapeFileError(f"{where}: source: {wrong}")
     able = [part for part in parts if part.mesh.faces]
     face = choose_face(where, able, wishes.mesh, wishes.rather)
-    return _Joining(face, parts, unit, wishes, edited, axes).made()
+    joining = _Joining(face, parts, unit, wishes, edited, axes)
+    if stands:
+        joining.take_standing()
+    else:
+        joining.turn_and_size()
+    return joining.made()
 
 
 class _Joining:
@@ -133,9 +141,18 @@ class _Joining:
         names = dict.fromkeys(name for part in parts for name in part.shapes)
         return assign([name for name in names if "+" not in name], self.edited)
 
-    def made(self) -> Joined:
+    def turn_and_size(self) -> None:
+        """All parts so that they stand, at a face's size."""
         self._turn()
         self._size()
+
+    def take_standing(self) -> None:
+        """The parts as they are, which stand."""
+        self.left = 1
+        points, shapes = self.face.mesh.positions, self.face.shapes
+        self.height = face_height(points, shapes, self.became.controls)
+
+    def made(self) -> Joined:
         height = self.height
         opening = self._opening()
         mm = UNITS[self.unit]

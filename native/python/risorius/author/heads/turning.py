@@ -16,7 +16,7 @@ from .islands import Ball, ball_of, islands_of
 from .parts import HeadPart, first_vertices, taken_apart
 
 # What the look controls turn an eye by, in degrees about x (down is above 0) and y (left is).
-_LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
+LOOKS = {"eyeLookUp": (-25, 0), "eyeLookDown": (30, 0), "eyeLookLeft": (0, 30),
           "eyeLookRight": (0, -30)}  # fmt: skip
 _EYE = re.compile(r"eye|iris|pupil|sclera|cornea", re.IGNORECASE)
 _BESIDE = re.compile(r"lash|brow|lid|eyeline|shadow|wet|edge|occl|glass|tear|shell", re.IGNORECASE)
@@ -214,14 +214,21 @@ def eye_turn(eye: Eye, controls: Mapping[str, Sequence[str]]) -> tuple[Turn, dic
             left[name] = rest
         else:
             kept.append(name)
-    for look, angles in _LOOKS.items():
-        x, y = np.radians(angles)
-        vector = np.array([[x, y, 0.0]])
-        rotation = sk.matrices_of_vectors(vector)[0]
-        turn.motions.setdefault(look + eye.side, (rotation, np.zeros(3)))
+    for look in LOOKS:
+        turn.motions.setdefault(look + eye.side, (look_turn(look), np.zeros(3)))
     for part in eye.parts:
         part.shapes = {name: part.shapes[name] for name in kept if name in part.shapes}
     return turn, left
+
+
+def look_turn(look: str) -> Doubles:
+    """float64[3, 3]: what a look control turns an eye by.
+
+    Args:
+        look: one of LOOKS, the control's name without its side.
+    """
+    x, y = np.radians(LOOKS[look])
+    return np.asarray(sk.matrices_of_vectors(np.array([[x, y, 0.0]]))[0])
 
 
 def _longest(rows: Doubles) -> float:

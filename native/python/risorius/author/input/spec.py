@@ -35,7 +35,7 @@ from .shape_face import (
 )
 
 _READERS = {suffix: read_gltf_head for suffix in gltf.SUFFIXES} | {fbx.SUFFIX: read_fbx_head}
-_BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
+BY_BLENDER = (".usd", ".usdc", ".usda", ".usdz", ".abc", ".blend", ".dae")
 _MOST_JOINTS = 4096
 _MOST_VERTICES = 1 << 26
 
@@ -118,7 +118,7 @@ def read_spec(path: Path) -> Spec:
     if path.is_dir():
         source = {"neutral": find_neutral(path).name, "expressions": "."}
         return Spec(path / "head", path.resolve().name, source, _options(path, {}))
-    if path.suffix.lower() in (*_READERS, *_BY_BLENDER):
+    if path.suffix.lower() in (*_READERS, *BY_BLENDER):
         return _spec_of(path, {"source": {"neutral": path.name}})
     return _spec_of(path, _read_tables(path))
 
@@ -128,7 +128,7 @@ def _spec_of(path: Path, table: dict[str, Any]) -> Spec:
     if ("dna" in source) == ("neutral" in source):
         raise ShapeFileError(f"{path}: source: either dna or neutral was expected")
     suffix = Path(source.get("neutral", "")).suffix.lower()
-    if suffix in _BY_BLENDER:
+    if suffix in BY_BLENDER:
         raise ShapeFileError(
             f"{path}: source.neutral: OBJ, glTF, GLB or FBX was expected, found {suffix}: import "
             "it into Blender and choose Object > Make Rig from Shape Keys, or save it there as glTF"

@@ -25,7 +25,7 @@ from ...author.heads.textures import metadata_of, texture_folder, textures_of
 from ...author.input import said as sayings
 from ...author.input.library import about_library, library_files, library_folder
 from ...author.input.matching import Assignment
-from ...author.input.spec import Spec, read_face, read_spec
+from ...author.input.spec import Read, Spec, read_face, read_spec
 from ...author.joint_rig import JointRig, lighten, make_joint_rig
 from ...author.work import TOLERANCE, RigOptions
 from ...base.words import counted
@@ -33,12 +33,16 @@ from ...controls.vocabulary import vocabulary
 from ...files import fileio
 from ..files import CommandLineError, number, require_suffix, whole_number
 from ..pages.authoring import need_plot, report_page
+from . import conform
+from .onto import add_arguments, check_arguments, read_onto, spec_of
 
 _DESCRIPTION = """\
 Finds joints, skin weights and joint motions that repeat the expressions of a face, and writes them
 as a DNA file; what joints leave beyond a tolerance stays as blend shapes. HEAD is a glTF or FBX
 file, a folder of OBJ files, or a SPEC.toml that says where the face is (one of these, or a DNA file
-whose expressions are blend shapes) and what the rig is to be: see docs/authoring.md."""
+whose expressions are blend shapes) and what the rig is to be: see docs/authoring.md. With --onto
+the head needs no expressions, and HEAD is a DNA file that has them; with --conform HEAD is a DNA
+file that takes another head's form: see docs/anyhead.md."""
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -105,14 +109,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="0: one for each core",
     )
     parser.add_argument("--json", action="store_true", help="the errors for a program")
+    add_arguments(parser)
+    conform.add_arguments(parser)
     parser.set_defaults(func=run)
 
 
 def run(args: argparse.Namespace) -> int:
+    say = _Clock(quiet=args.json)
+    if args.conform is not None:
+        return conform.run(args, say)
     spec = _spec(args)
     _size(spec, args)
     options, asked = _options(spec, args), _correctives(spec, args)
-    read = read_face(spec)
+    read, beside = _read(spec, args, say)
     dna, became = read.dna, read.became
     is_table = args.names == "" or args.out is None
     for sentence in read.odd:  # in a table as comments: it is a file of names as it is printed
@@ -133,7 +142,7 @@ def run(args: argparse.Namespace) -> int:
             raise CommandLineError("author: another file than that of -o was expected of --report")
         need_plot()
     options = replace(options, kept=(*options.kept, *read.kept))
-    say, source = _Clock(quiet=args.json), dna
+    source = dna
     if asked.most or asked.together:
         say.line("looking for what goes wrong where expressions meet")
         found = find_correctives(dna, asked, say)
@@ -149,7 +158,7 @@ def run(args: argparse.Namespace) -> int:
         rig.dna.mesh_names, read.materials, textures
     )
     files = {args.out: rig.dna.to_bytes()}
-    files |= library | textures.files
+    files |= library | textures.files | beside
     if args.json:
         said = [json.dumps(as_json(rig))]
         print("\n".join(textures.notes), end="\n" if textures.notes else "", file=sys.stderr)
@@ -164,7 +173,15 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _read(spec: Spec, args: argparse.Namespace, say: _Clock) -> tuple[Read, dict[Path, bytes]]:
+    """The face of shapes, and files that are to be written beside it."""
+    return (read_face(spec), {}) if args.onto is None else read_onto(args, say)
+
+
 def _spec(args: argparse.Namespace) -> Spec:
+    check_arguments(args)
+    if args.onto is not None:
+        return spec_of(args)
     if args.spec is None and args.names:  # author --names SPEC.toml
         args.spec, args.names = Path(args.names), ""
     if args.spec is None:
@@ -211,6 +228,8 @@ def _size(spec: Spec, args: argparse.Namespace) -> None:
     """What the command line says of a head's size goes before what the spec says."""
     said = {"height_mm": args.height_mm, "scale": args.scale}
     said = {name: value for name, value in said.items() if value is not None}
+    if args.onto is not None:
+        return
     if said and "dna" in spec.source:
         raise CommandLineError(f"author: a DNA file has its size: {next(iter(said))} is of others")
     if said:

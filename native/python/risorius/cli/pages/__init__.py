@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Commands that write pages for people who look."""
+"""Commands that write pages to look at."""

@@ -15,7 +15,7 @@ from ...author.joint_rig import JointRig
 from ...author.measure import expression_errors
 from ..files import InputError
 
-if TYPE_CHECKING:  # they need Matplotlib
+if TYPE_CHECKING:  # both need Matplotlib
     from ...plot.drawing.draw_errors import Expression
     from ...plot.report import ExpressionRow
 
@@ -26,7 +26,7 @@ _DPI = 150
 
 
 def need_plot() -> None:
-    """Raises InputError where there is nothing to draw with."""
+    """Raises InputError if Matplotlib is missing."""
     try:
         from ...plot import report  # noqa: F401
     except ImportError as error:
@@ -36,13 +36,13 @@ def need_plot() -> None:
 
 
 def report_page(source: risorius.Dna, rig: JointRig, data: bytes, name: str) -> bytes:
-    """The result, drawn beside its source.
+    """A page that shows the result beside its source.
 
     Args:
-        source: the face of shapes.
-        rig: the face of joints and its errors.
-        data: the bytes of its DNA file.
-        name: of that file.
+        source: the blend shape face.
+        rig: the joint face and its errors.
+        data: the bytes of the joint face's DNA file.
+        name: name of the DNA file.
 
     Returns:
         The page, as HTML.
@@ -68,7 +68,7 @@ def report_page(source: risorius.Dna, rig: JointRig, data: bytes, name: str) -> 
 
 
 def _microseconds(dna: risorius.Dna, lod: int) -> float:
-    """Of a pose with twenty controls that move, the median."""
+    """Median time of a pose with twenty active controls."""
     rig = risorius.Rig(dna)
     raw = np.zeros(len(rig.raw_control_names), np.float32)
     raw[:: max(1, len(raw) // 20)] = 0.5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius export: a face with morph targets, for programs that drive them by name."""
+"""risorius export: a face with morph targets, for programs that drive targets by name."""
 
 from __future__ import annotations
 
@@ -23,33 +23,37 @@ from ..files import (
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "export",
-        help="the face as glTF with morph targets: ARKit, visemes, VRM",
-        description="A .glb whose morph targets are the evaluated rig at each pose, joints and "
-        "correctives included, for programs that drive a face by names.",
+        help="export the face as glTF with morph targets: ARKit, visemes, VRM",
+        description="Writes a .glb with the evaluated rig at each pose as a morph target, joints "
+        "and correctives included, for programs that drive targets by name.",
     )
-    parser.add_argument("file", type=Path, help="the DNA file; textures beside it come along")
-    parser.add_argument("-o", "--out", type=Path, metavar="FACE.glb", help="else FILE.glb")
+    parser.add_argument("file", type=Path, help="the DNA file; textures next to it are included")
+    parser.add_argument("-o", "--out", type=Path, metavar="FACE.glb", help="default: FILE.glb")
     parser.add_argument(
         "--shapes",
         default="arkit,visemes",
         metavar="GROUPS",
-        help=f"of {', '.join(GROUPS)}, with commas between; all: each control by its own name",
+        help=f"groups, separated by commas: {', '.join(GROUPS)}; all: each control by its own name",
     )
     parser.add_argument("--lod", type=whole_number(0, 65535), default=0, metavar="N")
     parser.add_argument(
         "--mb",
         type=number(0, above=True),
         metavar="N",
-        help="megabytes: textures become smaller, then vertices are quantized, then a coarser LOD",
+        help="largest size in MB: shrinks textures, then quantizes, then takes a coarser LOD",
     )
     parser.add_argument(
-        "--textures", type=whole_number(16, 8192), default=1024, metavar="N", help="pixels a side"
+        "--textures", type=whole_number(16, 8192), default=1024, metavar="N", help="pixels per side"
     )
-    parser.add_argument("--most", type=whole_number(1), metavar="N", help="targets of the client")
+    parser.add_argument(
+        "--most", type=whole_number(1), metavar="N", help="target limit of the client"
+    )
     parser.add_argument(
         "--no-skeleton", action="store_true", help="no joints of neck, jaw and eyes"
     )
-    parser.add_argument("--sparse", action="store_true", help="moved vertices of targets alone")
+    parser.add_argument(
+        "--sparse", action="store_true", help="store only moved vertices of targets"
+    )
     parser.add_argument("--quantize", action="store_true", help="KHR_mesh_quantization, 16 bits")
     parser.add_argument("--meshopt", action="store_true", help="EXT_meshopt_compression")
     parser.add_argument("--normals", action="store_true", help="targets change normals too")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius plot: a rig as pictures for people who look."""
+"""risorius plot: a rig as pictures."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def complain(args: argparse.Namespace) -> None:
-    """Raises CommandLineError for what is wrong before the file is looked at."""
+    """Raises CommandLineError for wrong options, before the file is opened."""
     require_suffix(args.out, (".html", ".png"), "-o")
     require_writable(args.out)
 

@@ -20,32 +20,35 @@ from ..files import CommandLineError, InputError, read_bytes, require_suffix, re
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "web",
-        help="the face as a web page",
-        description="One page that opens in a browser without a network: the face with sliders, "
-        "levels of detail and a clip, evaluated by the library itself.",
+        help="write the face as a web page",
+        description="Writes one page that opens in a browser without a network: the face with "
+        "sliders, LODs and a clip, evaluated by the library itself.",
     )
-    parser.add_argument("file", type=Path, help="the DNA file; textures beside it come along")
+    parser.add_argument("file", type=Path, help="the DNA file; textures next to it are included")
     parser.add_argument(
         "-o",
         "--out",
         type=Path,
         metavar="PAGE.html",
-        help="else FILE.html; FACE.js: a script that shows <risorius-face> on a page of your own",
+        help="default: FILE.html; FACE.js: a script that shows <risorius-face> on your own page",
     )
     parser.add_argument(
-        "--clip", type=Path, metavar="TAKE", help="animation that plays: .rzc, or what eval reads"
+        "--clip",
+        type=Path,
+        metavar="TAKE",
+        help="animation to play: .rzc, or any file that eval reads",
     )
-    parser.add_argument("--sound", type=Path, metavar="VOICE.wav", help="what the clip says")
+    parser.add_argument("--sound", type=Path, metavar="VOICE.wav", help="the voice of the clip")
     parser.add_argument(
         "--lods",
         metavar="A:B",
-        help="these levels of detail only: 0:2, or 1: for all but the finest",
+        help="LODs to keep: 0:2, or 1: for all except the finest",
     )
-    parser.add_argument("--title", help="in place of the character's name")
+    parser.add_argument("--title", help="title instead of the character's name")
     parser.set_defaults(func=run)
 
 
-_LAST_LOD = 65535  # of the format
+_LAST_LOD = 65535  # limit of the format
 
 
 def _lods(text: str | None) -> tuple[int, int] | None:
@@ -71,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
             raise CommandLineError("--sound: it goes with a clip: --clip TAKE")
         require_suffix(args.sound, SOUNDS, "--sound")
     lods = _lods(args.lods)
-    empty_page()  # a build without the page says so before the file is read
+    empty_page()  # fails for a build without the page before it reads the file
     dna = risorius.load(args.file, lods=lods)
     clip = None
     if args.clip is not None:

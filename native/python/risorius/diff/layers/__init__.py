@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What differs, one file for each layer of a DNA."""
+"""The differences, one module for each layer of a DNA."""

@@ -38,12 +38,12 @@ def compare(faces: Comparison) -> None:
 def table(
     place: Place, inputs: Space, outputs: Space, a: risorius.Conditionals, b: risorius.Conditionals
 ) -> None:
-    """Report rows of a table of conditionals, matched by what they read and write.
+    """Report rows of a conditional table, matched by their input and output.
 
     Args:
         place: where the difference is reported.
-        inputs: the controls that the rows read.
-        outputs: what the rows write.
+        inputs: elements that the rows read.
+        outputs: elements that the rows write.
         a, b: the table of each face.
     """
     rows_a = (inputs.in_a(a.input_indices), outputs.in_a(a.output_indices))
@@ -87,7 +87,8 @@ def _psds(faces: Comparison, place: Place) -> None:
         ("A", pairs.only_a, rows_a, faces.controls.a[named.only_a]),
         ("B", pairs.only_b, rows_b, faces.controls.b[named.only_b]),
     ):
-        left = left[~np.isin(rows[0][left], gone)]  # noqa: PLW2901 whole correctives are said above
+        # Whole correctives are reported above.
+        left = left[~np.isin(rows[0][left], gone)]  # noqa: PLW2901
         both = zip(
             faces.controls.labels(rows[0][left]), faces.controls.labels(rows[1][left]), strict=True
         )

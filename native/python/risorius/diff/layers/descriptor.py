@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Layers desc and dsce: what the character is and how its numbers are meant."""
+"""Layers desc and dsce: the character and the conventions of its numbers."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from .targets import compare_targets
 
 Numbers = npt.NDArray[np.uint32]
 
-# For each array: what one element is, the verb for its change, and its unit.
+# For each array: the noun for an element, the verb for its change, and its unit.
 _POINTS = (
     ("positions", "vertex", "moved", "length"),
     ("texture_coordinates", "UV", "changed", "number"),
@@ -67,7 +67,7 @@ def _points(place: Place, a: Floats, b: Floats, noun: str, verb: str, kind: str)
 
 
 def _layout(place: Place, noun: str, a: Numbers, b: Numbers) -> None:
-    """Corners: which position, UV and normal each has."""
+    """Corners: the position, UV and normal of each."""
     if len(a) != len(b):
         place.say(f"{counted(len(a), 'layout')} -> {len(b):,}")
         return

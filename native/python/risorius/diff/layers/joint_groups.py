@@ -60,7 +60,7 @@ def _group(place: Place, a: risorius.JointGroup, b: risorius.JointGroup) -> None
 
 
 def _values(place: Place, a: Floats, b: Floats, rows: Pairs, columns: Pairs, numbers: Ints) -> None:
-    """Values by joint attribute and control, wherever they stand."""
+    """Values by joint attribute and control, independent of their places."""
     x, y = cut(a, rows.a, columns.a), cut(b, rows.b, columns.b)
     changed = place.faces.changed(x, y)
     if not changed.any():

@@ -65,7 +65,7 @@ def _size(sets: list[tuple[risorius.MlOperation, ...]], i: int) -> int:
 
 
 def _numbered(noun: str, count_a: int, count_b: int) -> Space:
-    """Elements that only their place tells apart."""
+    """Elements that are identified only by their index."""
     pairs = pair(np.arange(count_a), np.arange(count_b))
     return Space(noun, [""] * count_a, [""] * count_b, pair_in_place(pairs, count_a, count_b))
 
@@ -81,7 +81,7 @@ def _operation(place: Place, a: risorius.MlOperation, b: risorius.MlOperation) -
 
 
 def _parameters(faces: Comparison, operation: risorius.MlOperation, side: str) -> Ints:
-    """Controls and networks under the numbers that both rigs share."""
+    """Controls and networks under the common numbers of both rigs."""
     numbers = integers(operation.parameters)
     if operation.operation_type in (_GATHER, _SCATTER):
         return faces.controls.in_a(numbers) if side == "a" else faces.controls.in_b(numbers)
@@ -94,7 +94,7 @@ def _parameters(faces: Comparison, operation: risorius.MlOperation, side: str) -
 
 
 def _list(place: Place, noun: str, a: npt.ArrayLike, b: npt.ArrayLike) -> None:
-    """Whole numbers that are known by their place."""
+    """Integers that are compared by index."""
     x, y = integers(a), integers(b)
     if len(x) != len(y):
         place.say(f"{counted(len(x), noun)} -> {len(y):,}")

@@ -46,6 +46,6 @@ def compare_skin(place: Place, a: risorius.Mesh, b: risorius.Mesh) -> None:
 
 
 def _vertices(mesh: risorius.Mesh) -> Ints:
-    """int64[influences]: whose each influence is."""
+    """int64[influences]: the vertex of each influence."""
     sizes = np.diff(integers(mesh.skin_offsets))
     return np.repeat(np.arange(len(sizes)), sizes)

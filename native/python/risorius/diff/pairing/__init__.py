@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Which part of one DNA is which of the other, and how two values differ."""
+"""Matches the parts of two DNAs and measures the difference of values."""

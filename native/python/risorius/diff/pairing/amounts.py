@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How much numbers changed, in units that people think in."""
+"""Changes of numbers in familiar units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MILLIMETRES = {"cm": 10.0, "m": 1000.0}
 
 
 def differs(a: Floats, b: Floats) -> Bools:
-    """bool[...]: where two float32 arrays a and b of one shape differ in a bit.
+    """bool[...]: whether two float32 arrays a and b of one shape differ in any bit.
 
     A NaN is equal to itself; 0 and -0 are not equal.
     """
@@ -23,10 +23,9 @@ def differs(a: Floats, b: Floats) -> Bools:
 
 
 def near(a: Floats, b: Floats) -> Bools:
-    """bool[...]: where two float32 arrays a and b of one shape are equal but for rounding.
+    """bool[...]: whether two float32 arrays a and b of one shape are equal up to rounding.
 
-    The bound is 1e-5 times the size of the number in a, and 1e-5 for numbers below 1. A NaN is near
-    nothing.
+    The tolerance is 1e-5 times the number in a, at least 1e-5. NaN is near nothing.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         wide = a.astype(np.float64)
@@ -34,7 +33,7 @@ def near(a: Floats, b: Floats) -> Bools:
 
 
 def largest(a: Floats, b: Floats) -> float:
-    """The largest |a - b| of float32 arrays of one shape; infinite where either is not finite."""
+    """The largest |a - b| of float32 arrays of one shape; infinite if either is not finite."""
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(a.astype(np.float64) - b.astype(np.float64))
     apart = np.where(np.isnan(apart), np.inf, apart)
@@ -46,7 +45,7 @@ def length(amount: float, unit: str) -> str:
 
     Args:
         amount: in the translation unit of the file.
-        unit: that unit, "cm" or "m"; for another one the number is given without a unit.
+        unit: that unit, "cm" or "m"; for any other the number has no unit.
     """
     if unit not in _MILLIMETRES:
         return f"{amount:.3g}"
@@ -68,13 +67,13 @@ def angle(amount: float, unit: str) -> str:
 
 
 def by(amount: float, words: str, several: bool) -> str:
-    """How much changed as the end of a sentence, e.g. "by up to 0.3 mm".
+    """A change as the end of a sentence, e.g. "by up to 0.3 mm".
 
     Args:
-        amount: the largest change; 0 where only the sign of a zero changed, infinite where a number
-            is not finite.
+        amount: the largest change; 0 if only the sign of a zero changed, infinite if a number is
+            not finite.
         words: the amount in words, of `length` or `angle`.
-        several: whether more than one number changed, which makes it "up to".
+        several: more than one number changed, which gives "up to".
     """
     if amount == 0:
         return "only from 0 to -0 or back"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Comparisons that several layers need. Each reports what differs and returns nothing."""
+"""Comparisons that several layers share. Each reports differences and returns nothing."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from .spaces import Space
 
 
 class Place:
-    """Where differences are reported: a layer, a field and the words before each text."""
+    """The place of differences: a layer, a field and a prefix of each text."""
 
     def __init__(self, faces: Comparison, layer: str, field: str = "", what: str = ""):
         self.faces, self.layer, self.field, self.what = faces, layer, field, what
 
     def at(self, name: str, what: str = "") -> Place:
-        """The place of a field inside this one.
+        """The place of a field within this one.
 
         Args:
-            name: of the field, put behind a dot; "": the same field.
-            what: words that stand before each text from there, behind those of this place.
+            name: name of the field, appended after a dot; "": the same field.
+            what: prefix of each text there, after the prefix of this place.
         """
         field = ".".join(part for part in (self.field, name) if part)
         return Place(self.faces, self.layer, field, ", ".join(w for w in (self.what, what) if w))
@@ -40,7 +40,7 @@ class Place:
 
 
 def value(place: Place, a: Any, b: Any) -> None:
-    """Report one value (a text, a whole number, a tuple) where a is not equal to b.
+    """Report a value (a text, an integer, a tuple) if a and b differ.
 
     Args:
         place: where the difference is reported.
@@ -51,11 +51,11 @@ def value(place: Place, a: Any, b: Any) -> None:
 
 
 def choice(place: Place, words: Sequence[str], a: int, b: int) -> None:
-    """Report a number that stands for a word where it differs.
+    """Report a number that stands for a word, if it differs.
 
     Args:
         place: where the difference is reported.
-        words: the word of each number; a number beyond the list is called unknown.
+        words: the word of each number; a larger number is called unknown.
         a, b: the number in each face, from 0.
     """
     if a != b:
@@ -71,7 +71,7 @@ def _shown(x: Any) -> str:
 
 
 def real(place: Place, a: float, b: float) -> None:
-    """Report one float where it differs.
+    """Report a float if it differs.
 
     Args:
         place: where the difference is reported.
@@ -83,13 +83,13 @@ def real(place: Place, a: float, b: float) -> None:
 
 
 def reals(place: Place, noun: str, a: Floats, b: Floats, kind: str = "number") -> None:
-    """Report two lists of floats, number by number, or their lengths where these differ.
+    """Report two lists of floats by number, or their lengths if these differ.
 
     Args:
         place: where the difference is reported.
-        noun: what one number is, e.g. "weight".
+        noun: name of a number, e.g. "weight".
         a, b: float32[n], float32[m].
-        kind: "length", "angle" or "number": in which unit the amount is said.
+        kind: "length", "angle" or "number": the unit of the amount.
     """
     if len(a) != len(b):
         place.say(f"{counted(len(a), noun)} -> {len(b):,}")
@@ -101,12 +101,12 @@ def reals(place: Place, noun: str, a: Floats, b: Floats, kind: str = "number") -
 
 
 def order(place: Place, pairs: Pairs, noun: str) -> None:
-    """Report whether partners stand in another order.
+    """Report a different order of matched elements.
 
     Args:
         place: where the difference is reported.
-        pairs: which element of A is which element of B.
-        noun: what the elements are called, in the plural.
+        pairs: matched elements of A and B.
+        noun: name of the elements, in the plural.
     """
     if pairs.reordered:
         place.say(f"the {noun} stand in another order")
@@ -117,7 +117,7 @@ def members(place: Place, space: Space, a: npt.ArrayLike, b: npt.ArrayLike) -> N
 
     Args:
         place: where the difference is reported.
-        space: what the indices count.
+        space: the indexed elements.
         a, b: int[n], int[m], indices into the elements of A and of B.
     """
     x, y = space.in_a(a), space.in_b(b)
@@ -127,12 +127,12 @@ def members(place: Place, space: Space, a: npt.ArrayLike, b: npt.ArrayLike) -> N
 
 
 def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> str:
-    """The difference of two lists in words, e.g. "3 joints more: x, y, z"; "" for equal lists.
+    """The difference of two lists in words, e.g. "3 joints more: x, y, z"; "" if they are equal.
 
     Args:
-        place: whose report shortens lists of names.
-        pairs: which entry of a is which entry of b.
-        space: what the numbers count.
+        place: its report shortens lists of names.
+        pairs: matched entries of a and b.
+        space: the numbered elements.
         a, b: int64[n], int64[m], common numbers of the space.
     """
     listed = place.faces.report.listed
@@ -147,7 +147,7 @@ def more_and_less(place: Place, pairs: Pairs, space: Space, a: Any, b: Any) -> s
 
 
 def rows_per_lod(place: Place, a: npt.NDArray[Any], b: npt.NDArray[Any]) -> None:
-    """Report how many leading rows each LOD uses, where it differs.
+    """Report the number of leading rows that each LOD uses, if it differs.
 
     Args:
         place: where the difference is reported.
@@ -159,14 +159,14 @@ def rows_per_lod(place: Place, a: npt.NDArray[Any], b: npt.NDArray[Any]) -> None
 
 
 def lod_mapping(place: Place, space: Space, a: risorius.LodMapping, b: risorius.LodMapping) -> None:
-    """Report which elements each LOD lists, where it differs.
+    """Report the elements that each LOD lists, if they differ.
 
-    Lists that are equal but stored or shared in another way are reported as such.
+    Lists that are equal but stored or shared differently are reported as such.
 
     Args:
         place: where the difference is reported.
-        space: what the lists hold indices of.
-        a, b: the LODs' lists of each face.
+        space: the listed elements.
+        a, b: the lists of the LODs in each face.
     """
     found = len(place.faces.report.differences)
     for lod in range(max(len(a), len(b))):
@@ -205,12 +205,12 @@ def _same_storage(space: Space, a: risorius.LodMapping, b: risorius.LodMapping) 
 
 
 def only_in(place: Place, space: Space, pairs: Pairs) -> None:
-    """Report the elements that one face has and the other has not.
+    """Report elements that only one face has.
 
     Args:
         place: where the difference is reported.
         space: the elements of both faces.
-        pairs: which element of A is which element of B.
+        pairs: matched elements of A and B.
     """
     for side, left, numbers in (("A", pairs.only_a, space.a), ("B", pairs.only_b, space.b)):
         if len(left):
@@ -219,12 +219,12 @@ def only_in(place: Place, space: Space, pairs: Pairs) -> None:
 
 
 def cut(values: Floats, rows: Ints, columns: Ints) -> Floats:
-    """float32[len(rows), len(columns)] of a matrix; the matrix itself where that is all of it.
+    """float32[len(rows), len(columns)] of a matrix; the matrix itself if nothing is cut.
 
     Args:
         values: float32[n, m].
-        rows: int64, which rows, in the order wanted.
-        columns: int64, which columns, in the order wanted.
+        rows: int64, selected rows in order.
+        columns: int64, selected columns in order.
     """
     if values.shape == (len(rows), len(columns)) and _all(rows) and _all(columns):
         return values

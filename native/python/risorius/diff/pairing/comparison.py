@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Two rigs, the numbers that their elements have in common, and the report."""
+"""Two rigs, the common numbers of their elements, and the report."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ QUATERNION_ATTRIBUTES = ("tx", "ty", "tz", "qx", "qy", "qz", "qw", "sx", "sy", "
 
 
 class Comparison:
-    """What the modules of the layers share.
+    """The context that the modules of the layers share.
 
-    exact: whether numbers must have the same bits; not so after a conversion, which rounds.
+    exact: compare bits; false after a conversion, which rounds.
     """
 
     def __init__(self, a: risorius.Dna, b: risorius.Dna, report: Report, exact: bool = True):
@@ -35,15 +35,15 @@ class Comparison:
     # ---- numbers
 
     def changed(self, a: Floats, b: Floats) -> Bools:
-        """bool[...]: where float32 arrays a and b of one shape differ.
+        """bool[...]: whether float32 arrays a and b of one shape differ.
 
-        They differ in a bit if the comparison is exact, else by more than rounding.
+        In bits if the comparison is exact, otherwise by more than rounding.
         """
         different = amounts.differs(a, b)
         return different if self.exact else different & ~amounts.near(a, b)
 
     def by(self, a: Floats, b: Floats, kind: str = "number") -> str:
-        """How much numbers changed, e.g. "by up to 0.3 mm".
+        """The amount of a change, e.g. "by up to 0.3 mm".
 
         Args:
             a, b: float32[...] of one shape.
@@ -53,7 +53,7 @@ class Comparison:
         return amounts.by(amount, self.measure(amount, kind), a.size > 1)
 
     def distance(self, a: Floats, b: Floats) -> str:
-        """How far points moved, e.g. "by up to 0.3 mm".
+        """The distance that points moved, e.g. "by up to 0.3 mm".
 
         Args:
             a, b: float32[n, 3], in the translation unit of A.
@@ -115,7 +115,7 @@ class Comparison:
 
     @cached_property
     def pose_controls(self) -> Space:
-        # A file of 2.4 has no layer rbfe: its poses are controls of their own.
+        # A 2.4 file has no layer rbfe: its poses are controls of their own.
         names = [
             dna.rbf_behavior_ext.pose_control_names or [p.name for p in dna.rbf_behavior.poses]
             for dna in (self.a, self.b)
@@ -137,7 +137,7 @@ class Comparison:
 
     @cached_property
     def psds(self) -> Space:
-        """Correctives are known by what they multiply."""
+        """Correctives, identified by their factors."""
         names_a, names_b = (
             correctives(dna, which, self.raw, self.ml, self.pose_controls)
             for dna, which in ((self.a, "a"), (self.b, "b"))
@@ -150,7 +150,7 @@ class Comparison:
 
     @cached_property
     def networks(self) -> Space:
-        """Networks are known by the controls that they write."""
+        """Networks, identified by the controls that they write."""
         a = self.a.machine_learned_behavior.neural_networks
         b = self.b.machine_learned_behavior.neural_networks
         pairs = pair_sets(
@@ -163,8 +163,8 @@ class Comparison:
         """Common numbers of attributes of A's joints: the joint's number * stride + attribute.
 
         Args:
-            outputs: int[n], joint index * stride + attribute, as the joint groups of A store it.
-            stride: attributes of a joint; 9 with Euler angles, 10 with quaternions.
+            outputs: int[n], joint index * stride + attribute, as stored in the joint groups of A.
+            stride: attributes per joint; 9 with Euler angles, 10 with quaternions.
         """
         joint, attribute = np.divmod(integers(outputs), stride)
         return self.joints.in_a(joint) * stride + attribute
@@ -173,8 +173,8 @@ class Comparison:
         """Common numbers of attributes of B's joints, see `rows_in_a`.
 
         Args:
-            outputs: int[n], joint index * stride + attribute, as the joint groups of B store it.
-            stride: attributes of a joint; 9 with Euler angles, 10 with quaternions.
+            outputs: int[n], joint index * stride + attribute, as stored in the joint groups of B.
+            stride: attributes per joint; 9 with Euler angles, 10 with quaternions.
         """
         joint, attribute = np.divmod(integers(outputs), stride)
         return self.joints.in_b(joint) * stride + attribute
@@ -183,8 +183,8 @@ class Comparison:
         """Attributes of joints for people, e.g. "FACIAL_C_Jaw.tx".
 
         Args:
-            numbers: int64[n], of `rows_in_a` or `rows_in_b`.
-            stride: attributes of a joint, the same as there.
+            numbers: int64[n], from `rows_in_a` or `rows_in_b`.
+            stride: attributes per joint, the same as there.
         """
         names = ATTRIBUTES if stride == 9 else QUATERNION_ATTRIBUTES
         joint, attribute = np.divmod(numbers, stride)

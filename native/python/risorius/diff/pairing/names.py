@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What elements are known by that have no name of their own, or another one."""
+"""Labels of elements that have no name, or a different one."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ import risorius
 from .pairs import Ints, Pairs, integers, pair_names, with_renamed
 from .spaces import Space, chain
 
-_DEEPEST = 8  # so many levels of correctives of correctives are spelled out
+_DEEPEST = 8  # levels of correctives of correctives that are spelled out
 
 
 def padded(names: Sequence[str], count: int) -> list[str]:
-    """The names, with empty ones behind them until there are count of them."""
+    """The names, padded with empty ones to count."""
     return [*names, *[""] * (count - len(names))]
 
 
 def correctives(
     dna: risorius.Dna, which: str, raw: Space, ml: Space, pose_controls: Space
 ) -> list[str]:
-    """What each corrective multiplies, e.g. "corrective jaw * smile"; "" where nothing.
+    """The factors of each corrective, e.g. "corrective jaw * smile"; "" if there are none.
 
     Args:
-        which: "a" or "b", whose numbers the indices of dna are.
-        raw, ml, pose_controls: the controls around the correctives.
+        which: "a" or "b": the face to which dna belongs.
+        raw, ml, pose_controls: the other parts of the control vector.
     """
     count, first = dna.psd_count, len(dna.raw_control_names)
-    # Correctives are not matched yet, so those of A and B get different numbers.
+    # Correctives are not matched yet, so that those of A and B get different numbers.
     nothing = integers([])
     alone = Pairs(nothing, nothing, np.arange(count), nothing)
     own = Space("corrective", [""] * count, [], alone)
@@ -50,7 +50,7 @@ def correctives(
 
 
 def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
-    """factors[i]: (index of a corrective, if it is one, and the label) of what i multiplies."""
+    """factors[i]: (index, if it is a corrective, and label) of each factor of i."""
 
     def product(i: int, depth: int) -> str:
         parts = []
@@ -63,10 +63,10 @@ def _products(factors: list[list[tuple[int, str]]]) -> list[str]:
 
 
 def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
-    """Which joint of face a is which joint of face b.
+    """The matching joints of faces a and b.
 
-    Joints of one name are the same. Of the others those that have the same parent and neutral pose,
-    then those that have the same index and neutral pose, are taken for renamed.
+    Joints are matched by name. Of the others, joints with the same parent and neutral pose, then
+    joints with the same index and neutral pose, count as renamed.
     """
     pairs = pair_names(a.joint_names, b.joint_names)
     neutral_a, neutral_b = _neutral(a), _neutral(b)
@@ -87,7 +87,7 @@ def joint_pairs(a: risorius.Dna, b: risorius.Dna) -> Pairs:
 
 
 def _neutral(dna: risorius.Dna) -> list[bytes]:
-    """Of each joint, its neutral translation and rotation but for rounding."""
+    """The neutral translation and rotation of each joint, up to rounding."""
     both = [dna.neutral_joint_translations, dna.neutral_joint_rotations]
     count = len(dna.joint_names)
     if any(len(values) != count for values in both):
@@ -106,7 +106,7 @@ def _parents(dna: risorius.Dna) -> Ints:
 
 
 def _keys(joints: Ints, parents: Ints, neutral: list[bytes]) -> dict[tuple[int, bytes], int]:
-    """Joints by parent and neutral; those that are alike are left out."""
+    """Joints by parent and neutral pose; ambiguous ones are left out."""
     found: dict[tuple[int, bytes], list[int]] = {}
     for joint in joints.tolist():
         found.setdefault((int(parents[joint]), neutral[joint]), []).append(joint)

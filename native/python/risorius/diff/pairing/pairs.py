@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which element of one list is which element of another."""
+"""Matches the elements of two lists."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ Bools = npt.NDArray[np.bool_]
 class Pairs:
     """Positions in two lists.
 
-    a, b: int64[pairs], where the same thing stands in each, in the order of A.
-    only_a, only_b: int64, what has no partner.
+    a, b: int64[pairs], positions of matched elements in each list, in the order of A.
+    only_a, only_b: int64, positions of elements without a match.
     """
 
     a: Ints
@@ -28,12 +28,12 @@ class Pairs:
 
     @property
     def whole(self) -> bool:
-        """Whether everything has a partner."""
+        """Whether every element has a match."""
         return len(self.only_a) == len(self.only_b) == 0
 
     @property
     def reordered(self) -> bool:
-        """Whether the partners stand in another order; an insertion alone is none."""
+        """Whether matched elements have another order; an insertion alone does not count."""
         return bool(np.any(np.diff(self.b) < 0))
 
     @property
@@ -47,7 +47,7 @@ def integers(values: npt.ArrayLike) -> Ints:
 
 
 def pair(a: Ints, b: Ints) -> Pairs:
-    """Pairs equal numbers: of numbers that repeat the first with the first, and so on.
+    """Match equal numbers; of repeated numbers the first with the first, and so on.
 
     Args:
         a, b: int64[n], int64[m].
@@ -73,7 +73,7 @@ def _rest(taken: Ints, count: int) -> Ints:
 
 
 def occurrence(keys: Ints) -> Ints:
-    """int64[n]: how often each key stood before."""
+    """int64[n]: the number of earlier occurrences of each key."""
     order = np.argsort(keys, kind="stable")
     run = keys[order]
     first = np.ones(len(keys), np.bool_)
@@ -85,13 +85,13 @@ def occurrence(keys: Ints) -> Ints:
 
 
 def together(parts: Sequence[Ints]) -> Ints:
-    """All keys as small numbers, equal ones equal, part after part."""
+    """All keys as small numbers, equal for equal keys, part after part."""
     _, small = np.unique(np.concatenate(parts), return_inverse=True)
     return small.reshape(-1).astype(np.int64)
 
 
 def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Pairs equal rows of several numbers, as `pair` does with single numbers.
+    """Match equal rows of several numbers, like `pair` for single numbers.
 
     Args:
         a, b: the columns of each list, the same number of them: int64[n] each, int64[m] each.
@@ -106,18 +106,18 @@ def pair_rows(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
 
 
 def pair_names(a: Sequence[str], b: Sequence[str]) -> Pairs:
-    """Pairs equal texts of the lists a and b, as `pair` does with numbers."""
+    """Match equal texts of the lists a and b, like `pair` for numbers."""
     number: dict[str, int] = {}
     numbered = [integers([number.setdefault(name, len(number)) for name in x]) for x in (a, b)]
     return pair(*numbered)
 
 
 def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
-    """Pairs with further ones.
+    """The pairs and additional ones.
 
     Args:
-        pairs: those that are known.
-        extra_a, extra_b: int64[n], positions without a partner so far: extra_a[i] is extra_b[i].
+        pairs: the known ones.
+        extra_a, extra_b: int64[n], unmatched positions: extra_a[i] matches extra_b[i].
     """
     a, b = np.concatenate([pairs.a, extra_a]), np.concatenate([pairs.b, extra_b])
     order = np.argsort(a)
@@ -127,11 +127,11 @@ def with_renamed(pairs: Pairs, extra_a: Ints, extra_b: Ints) -> Pairs:
 
 
 def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
-    """Pairs, and further ones: what has no partner in either list and stands at the same position.
+    """The pairs, and matches of unmatched elements at the same position in both lists.
 
     Args:
-        pairs: those that are known.
-        count_a, count_b: how long the lists are; nothing is added unless they are equally long.
+        pairs: the known ones.
+        count_a, count_b: lengths of the lists; nothing is added if they differ.
     """
     if count_a != count_b:
         return pairs
@@ -140,10 +140,10 @@ def pair_in_place(pairs: Pairs, count_a: int, count_b: int) -> Pairs:
 
 
 def pair_sets(a: Sequence[Ints], b: Sequence[Ints]) -> Pairs:
-    """Pairs sets that have no name: equal ones, then those with most in common, then by place.
+    """Match sets without names: equal ones, then those with the most common keys, then by index.
 
     Args:
-        a, b: the keys that each set holds.
+        a, b: the keys of each set.
     """
     exact = pair_names([_name(keys) for keys in a], [_name(keys) for keys in b])
     votes = _votes(a, b, exact)

@@ -1,34 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""Differences as they are found."""
+"""The collected differences."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
-_NAMES = 5  # so many names of a list are spelled out
+_NAMES = 5  # number of names of a list that are shown
 
 
 class Difference(NamedTuple):
-    """One thing that differs between the rigs A and B."""
+    """One difference between the rigs A and B."""
 
     layer: str
-    """descriptor, definition, behavior ...: where a person would look for it."""
+    """descriptor, definition, behavior ...: the layer."""
     field: str
-    """The property of Dna that it is about, e.g. meshes.positions."""
+    """The property of Dna, e.g. meshes.positions."""
     text: str
-    """In words."""
+    """The description."""
 
 
 class Report:
-    """Collects differences. everything: lists of names are not shortened."""
+    """Collects differences. everything: do not shorten lists of names."""
 
     def __init__(self, everything: bool = False) -> None:
         self.differences: list[Difference] = []
         self.everything = everything
 
     def add(self, layer: str, field: str, text: str) -> None:
-        """Add a difference; the layer, field and text are those of `Difference`."""
+        """Add a difference with the layer, field and text of `Difference`."""
         self.differences.append(Difference(layer, field, text))
 
     def listed(self, names: Sequence[str]) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Index spaces of two rigs as one: what is the same has one number, wherever it stands."""
+"""Common numbers for the elements of two rigs: matched elements have the same number."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy.typing as npt
 from ...base.words import plural
 from .pairs import Ints, Pairs, integers
 
-_OUTSIDE = 1 << 40  # indices beyond a list get numbers from here on
+_OUTSIDE = 1 << 40  # numbers of indices beyond a list begin here
 
 
 class Space:
     """The elements of two lists under common numbers.
 
-    noun: what an element is, e.g. "joint".
+    noun: name of an element, e.g. "joint".
     names: by number; first those of A, then those of B.
     a, b: int64, the number of each element.
-    pairs: which is which.
+    pairs: the matched elements.
     """
 
     def __init__(self, noun: str, names_a: Sequence[str], names_b: Sequence[str], pairs: Pairs):
@@ -32,11 +32,11 @@ class Space:
         self.b[pairs.b] = pairs.a
 
     def in_a(self, indices: npt.ArrayLike) -> Ints:
-        """The numbers of indices of A."""
+        """The common numbers of indices of A."""
         return _look_up(self.a, integers(indices))
 
     def in_b(self, indices: npt.ArrayLike) -> Ints:
-        """The numbers of indices of B."""
+        """The common numbers of indices of B."""
         return _look_up(self.b, integers(indices))
 
     def label(self, number: int) -> str:
@@ -60,12 +60,12 @@ def _look_up(numbers: Ints, indices: Ints) -> Ints:
 
 
 def chain(noun: str, parts: Sequence[Space]) -> Space:
-    """Several spaces after one another as one.
+    """Joins several spaces to one.
 
-    So the controls are numbered: raw controls, correctives, outputs of networks, RBF poses.
+    The control vector is made so: raw controls, correctives, outputs of networks, RBF poses.
 
     Args:
-        noun: what an element of the whole is.
+        noun: name of an element of the joined space.
         parts: the spaces in their order.
     """
     first_a = np.cumsum([0] + [len(part.a) for part in parts])

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""When the frames of a file are: units of time as people spell them, and timecodes."""
+"""The times of a file's frames: units of time in various spellings, and timecodes."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Times of SMPTE timecodes HH:MM:SS:FF, with a fraction of a frame, dropped or not."""
+"""SMPTE timecodes HH:MM:SS:FF, with fractions of a frame, drop-frame or not."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy.typing as npt
 from ..errors import AnimationFileError
 
 BASES = (24, 25, 30, 48, 50, 60, 100, 120)
-PHONES = (30, 60)  # what nearly all of them count
+PHONES = (30, 60)  # the frame rates of nearly all phones
 DAY = 86400.0
-# A second sign ; or , before the frames says drop-frame, as edit lists write it.
+# A ; or , as the last separator means drop-frame, as in edit lists.
 _FORM = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})([:;,])(\d{1,3}(?:\.\d*)?)")
 
 
@@ -24,18 +24,18 @@ class Timecode(NamedTuple):
     minutes: int
     seconds: int
     frames: float
-    """With its fraction."""
+    """Including its fraction."""
     is_dropped: bool
 
 
 def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
-    """A timecode HH:MM:SS:FF, the frame with a fraction or none.
+    """A timecode HH:MM:SS:FF, whose frame may have a fraction.
 
     Args:
-        text: the cell; ; or , before the frame says drop-frame.
-        name: what errors call the file.
+        text: the cell; ; or , before the frame means drop-frame.
+        name: the file's name in errors.
         line: from 1, for errors.
-        column: from 1, or what heads it, for errors.
+        column: from 1, or its header, for errors.
 
     Raises:
         AnimationFileError: another form, 60 minutes or seconds.
@@ -60,10 +60,10 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 
 
 def infer_base(codes: Sequence[Timecode]) -> int | None:
-    """Frames a second of the timecodes' own clock, or None if nothing tells.
+    """Frames per second of the timecodes' own clock, or None if it cannot be inferred.
 
-    What the timecodes show themselves wins; where they never reach the next second, or have lost
-    too much around it, the largest frame number tells, if one rate alone is usual there.
+    A rate measured from the timecodes wins. If they never reach the next second, or lost too many
+    rows around it, the largest frame number decides, provided that only one usual rate fits it.
     """
     frames = np.array([code.frames for code in codes])
     seconds = np.array([3600 * c.hours + 60 * c.minutes + c.seconds for c in codes])
@@ -75,7 +75,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
         return measured
     if largest >= 30:
         return 60 if largest < 60 else None
-    # Frame 29 is the highest in a take so long that at 60 frames a second it would pass 29.
+    # Frame 29 is the highest, and the take is so long that at 60 frames it would go beyond 29.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
@@ -84,10 +84,10 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
 def _measured(
     frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
 ) -> int | None:
-    """The base that the frame numbers show where the second changes by one, or None.
+    """The base that the frame numbers show where the second increases by one, or None.
 
-    There they fall by the base less a step. Rows that were lost there let them fall by less, so a
-    base that is not usual counts only where others agree with it, or where nothing is lost.
+    There they fall by the base minus one step. Lost rows make them fall by less, so that an unusual
+    base counts only if others agree with it, or if no rows are lost.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -111,20 +111,20 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     """Seconds of each timecode since midnight of the first, with midnights counted.
 
     Args:
-        codes: of `parse`, in the order of the frames.
-        base: frames that the timecode counts a second: 30 of 29.97.
-        is_true_rate: False where a second of timecode lasts 1.001 s: 23.976, 29.97, 59.94.
+        codes: from `parse`, in the order of the frames.
+        base: frames that the timecode counts per second: 30 for 29.97.
+        is_true_rate: False if a second of timecode lasts 1.001 s: 23.976, 29.97, 59.94.
 
     Returns:
         float64[codes].
     """
     hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
     count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames
-    # Drop-frame leaves out the first two numbers (of 30) of each minute but every tenth.
+    # Drop-frame skips the first two numbers (of 30) of each minute except every tenth.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by hours is midnight; a smaller one is a row out of order and stays one.
+    # A step back by hours is midnight; a smaller one is a row out of order and is kept.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
     return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Units of time in headers and keys, and the seconds that times in them are."""
+"""Units of time in headers and keys, and their conversion to seconds."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from ..errors import AnimationFileError
 Doubles = npt.NDArray[np.float64]
 
 UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
-"""Seconds of 1."""
+"""Seconds in one unit."""
 FRAMES, ROWS = "frames", "rows"
 CHOICES = (*UNITS, FRAMES, ROWS)
-"""What a caller may say that times count in; ROWS: they say nothing, each row is a frame."""
+"""Units that a caller may state; ROWS: times are ignored, and each row is a frame."""
 GIVE_RATE = "give the rate in frames a second (clip convert --input-rate; File Rate in Blender)"
 COUNT_ROWS = (
     "clip convert --time-unit rows with --input-rate (Time Unit and File Rate in Blender) counts "
@@ -39,45 +39,45 @@ _WORDS = (
     "unixtime unixtimestamp frametime sampletime"
 ).split()
 _FRAME_NUMBERS = "frame frames framenumber frameindex frameid frameno framenr".split()
-# Of units that stand alone these are no names of curves or of mouth shapes.
+# Units that may stand alone, because they are not names of curves or mouth shapes.
 _ALONE = "s sec secs second seconds ms msec millis milliseconds us microseconds nanoseconds".split()
 _NAMES: dict[str, str] = {
     **{word + unit: of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{f"{word}in{unit}": of for word in _WORDS for unit, of in _UNIT_OF.items()},
     **{unit: _UNIT_OF[unit] for unit in _ALONE},
     **dict.fromkeys(_FRAME_NUMBERS, FRAMES),
-    **dict.fromkeys([*_WORDS, "t", "ts"], ""),  # "times" is no "time" in "s"
+    **dict.fromkeys([*_WORDS, "t", "ts"], ""),  # "times" does not mean "time" in "s"
 }
-# What brackets behind a frame number say that is no unit.
+# Texts in brackets behind a frame number that are not units.
 _NUMBERED = ("", "no", "nr", "number", "index", "id", "count")
 _BRACKETS = re.compile(r"\(([^)]*)\)|\[([^\]]*)\]|\{([^}]*)\}")
-# Seconds between two frames up to which times without a unit are taken for seconds: keys lie as far
-# apart, frames never.
+# Times without a unit are taken as seconds up to this step between two of them: keys may lie this
+# far apart, frames never do.
 _LONGEST_STEP = 4.0
-# Milliseconds between two frames of a capture: 250 to 5 frames a second.
+# Steps of a capture in milliseconds: 250 to 5 frames per second.
 _STEPS = (4.0, 200.0)
-_LEAST_ROWS = 8  # from which on even steps tell a unit
-# Since 1970: from 1973 on in milliseconds, microseconds and nanoseconds.
+_LEAST_ROWS = 8  # number of rows from which even steps identify a unit
+# Times since 1970: dates after 1973 in milliseconds, microseconds and nanoseconds.
 _DATES = (("ns", 1e17), ("us", 1e14), ("ms", 1e11))
-_LONGEST = 1e8  # seconds; what begins later is a date
+_LONGEST = 1e8  # seconds; a later start is a date
 
 
 class TimeName(NamedTuple):
-    """The unit that a header gives the times below it."""
+    """The unit in a header of times."""
 
     unit: str
-    """One of UNITS, FRAMES, or "": it does not say."""
+    """One of UNITS, FRAMES, or "" if it has none."""
     odd: str = ""
-    """A unit in brackets that nobody knows."""
+    """An unknown unit in brackets."""
 
 
 class Asked(NamedTuple):
-    """Options on the time of a file; None: as the file says."""
+    """The caller's options on time; None: as the file says."""
 
     rate: float | None = None
-    """Frames a second."""
+    """Frames per second."""
     timecode_rate: float | None = None
-    """Frames a second of timecodes."""
+    """Frames per second of timecodes."""
     unit: str | None = None
     """One of CHOICES."""
 
@@ -87,15 +87,15 @@ class Asked(NamedTuple):
 
 
 def plain(header: str) -> str:
-    """A header without letter case, blanks and signs; both letters for micro are a u."""
+    """A header without letter case, blanks and punctuation; both letters for micro become u."""
     return re.sub(r"[^a-z0-9]", "", re.sub("[µμ]", "u", header.lower()))
 
 
 def time_name(header: str) -> TimeName | None:
-    """What a header of times says: "Time (ms)", "timestamp_us", "frame"; None: it is no time's.
+    """The unit in a header of times such as "Time (ms)", "timestamp_us", "frame"; None: not a time.
 
     Args:
-        header: of a column, or a key of JSON.
+        header: header of a column, or a key of JSON.
     """
     brackets = _BRACKETS.search(header)
     if brackets is None:
@@ -114,12 +114,12 @@ def time_name(header: str) -> TimeName | None:
 
 
 def row_times(count: int, asked: Asked, name: str) -> Doubles:
-    """float64[count] seconds of rows that lie evenly.
+    """float64[count] seconds of evenly spaced rows.
 
     Args:
-        count: of rows.
+        count: number of rows.
         asked: has the rate.
-        name: what errors call the file.
+        name: the file's name in errors.
 
     Raises:
         AnimationFileError: no rate.
@@ -138,21 +138,22 @@ def seconds_of(
     name: str,
     column: str | None = None,
 ) -> Doubles:
-    """Seconds of times in the unit that is asked for, else said, else the one that they show.
+    """Seconds of times in the caller's unit, else the header's, else the one inferred from the
+    values.
 
     Args:
-        values: float64[frames], as the file has them.
-        said: by their header.
-        asked: by the caller; `counts_rows` is the caller's to look at.
-        notes: gets a sentence where a unit is assumed.
-        name: what errors call the file.
-        column: where the times stand, for errors.
+        values: float64[frames], as in the file.
+        said: unit in the header.
+        asked: the caller's options; the caller of this function handles `counts_rows`.
+        notes: receives a sentence if a unit is assumed.
+        name: the file's name in errors.
+        column: column of the times, for errors.
 
     Returns:
-        float64[frames]; dates count from the first frame.
+        float64[frames]; dates are counted from the first frame.
 
     Raises:
-        AnimationFileError: an unknown unit, a frame number without a rate, times that tell no unit.
+        AnimationFileError: an unknown unit, a frame number without a rate, no recognisable unit.
     """
     unit = asked.unit or said.unit
     if said.odd and not asked.unit:
@@ -180,14 +181,14 @@ def seconds_of(
 
 
 def _shown(values: Doubles, name: str, column: str | None) -> str:
-    """The unit that times show by their size. Raises: AnimationFileError: none."""
+    """The unit inferred from the size of times. Raises: AnimationFileError: none fits."""
     smallest = float(values.min(initial=np.inf))
     for unit, least in _DATES:
         if np.isfinite(smallest) and smallest > least:
             return unit
     steps = np.diff(values)
     steps = np.sort(steps[steps > 0.0])
-    step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0  # one gap says nothing
+    step = float(steps[(steps.size - 1) // 2]) if steps.size else 0.0  # a single gap tells nothing
     if step <= _LONGEST_STEP:
         return "s"
     is_even = float(np.mean(np.abs(steps - step) <= 0.5 * step)) >= 0.8

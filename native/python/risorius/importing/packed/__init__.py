@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Numbers of meshes that a file holds packed: by meshoptimizer, by Draco."""
+"""Unpacks mesh data that meshoptimizer or Draco packed."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Meshes of glTF that Draco packed: KHR_draco_mesh_compression, by the package DracoPy.
+"""Reads glTF meshes that Draco packed (KHR_draco_mesh_compression), with the package DracoPy.
 
-Vertices come in the order of the packed data. Morph targets are never packed by Draco; the
-extension asks writers to keep them in that order.
+Vertices are in the order of the packed data. Draco never packs morph targets; the extension asks
+writers to keep them in that order.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ EXTENSION = "KHR_draco_mesh_compression"
 
 
 class MissingDracoError(RisoriusError):
-    """The package that reads Draco is not installed."""
+    """The package DracoPy is not installed."""
 
     code = "missing_draco"
 
 
 class DracoMesh:
-    """A mesh that was unpacked.
+    """An unpacked mesh.
 
     Attributes:
         triangles: int64[n, 3].
     """
 
     def __init__(self, packed: bytes) -> None:
-        """Unpacks.
+        """Unpack the bytes.
 
         Args:
-            packed: the bytes that the file holds.
+            packed: the bytes in the file.
 
         Raises:
             MissingDracoError: DracoPy is not installed.
-            GivenError: bytes that are no mesh of Draco.
+            GivenError: not a Draco mesh.
         """
         try:
             package: Any = importlib.import_module("DracoPy")
@@ -57,10 +57,10 @@ class DracoMesh:
         self.triangles: npt.NDArray[np.int64] = faces
 
     def rows(self, identity: object) -> npt.NDArray[np.float64]:
-        """float64[V, n] of the attribute of that number.
+        """float64[V, n] of the attribute with this number.
 
         Raises:
-            GivenError: there is none.
+            GivenError: no such attribute.
         """
         found = [row for row in self._mesh.attributes if row["unique_id"] == identity]
         if not found or isinstance(identity, bool):

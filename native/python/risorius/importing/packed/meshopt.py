@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Buffer views of glTF that meshoptimizer packed: EXT_meshopt_compression, and its successor of the
-same words."""
+"""Buffer views of glTF that meshoptimizer packed: EXT_meshopt_compression and its successor with
+the same fields."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ...base.given import GivenError, shown, text, whole
 EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL")
-_WIDEST = 256  # bytes of a row
+_WIDEST = 256  # bytes in a row
 
 
 @dataclass(frozen=True)
 class Packing:
-    """How a buffer view is packed.
+    """The packing of a buffer view.
 
     Attributes:
-        name: the extension's.
-        table: its own: buffer, byteOffset and byteLength say where the packed bytes are.
-        count, stride: rows, and bytes of each, once they are unpacked.
-        mode, filter: of MODES and FILTERS.
+        name: name of the extension.
+        table: the extension's table; buffer, byteOffset and byteLength locate the packed bytes.
+        count, stride: rows, and bytes per row, after unpacking.
+        mode, filter: from MODES and FILTERS.
     """
 
     name: str
@@ -37,18 +37,18 @@ class Packing:
 
     @property
     def size(self) -> int:
-        """Bytes once they are unpacked."""
+        """Bytes after unpacking."""
         return self.count * self.stride
 
 
 def packing_of(view: Mapping[str, Any]) -> Packing | None:
-    """How a buffer view is packed, or None where it is not.
+    """The packing of a buffer view, or None if it is not packed.
 
     Args:
-        view: the table of the JSON.
+        view: the table in the JSON.
 
     Raises:
-        GivenError: an entry of the extension that is not allowed; the sentence begins with it.
+        GivenError: an invalid entry of the extension, which begins the sentence.
     """
     found = view.get("extensions")
     extensions = found if isinstance(found, dict) else {}
@@ -70,14 +70,14 @@ def packing_of(view: Mapping[str, Any]) -> Packing | None:
 
 
 def unpacked(packed: bytes, packing: Packing) -> bytes:
-    """The bytes of a buffer view, packing.size of them.
+    """The unpacked bytes of a buffer view, packing.size of them.
 
     Args:
-        packed: the bytes that the file holds.
-        packing: of packing_of.
+        packed: the bytes in the file.
+        packing: from packing_of.
 
     Raises:
-        GivenError: bytes of another kind, damaged ones, or rows that the mode does not have.
+        GivenError: bytes of another kind, damaged bytes, or rows that the mode does not allow.
     """
     try:
         return _native.unpack_buffer(

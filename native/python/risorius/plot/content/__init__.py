@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""What the pages show: numbers taken from a DNA, without drawing."""
+"""Data of the drawings, taken from a DNA without drawing."""

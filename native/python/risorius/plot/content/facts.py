@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the pictures show, gathered once: counts, sizes, regions, levels of detail."""
+"""The data of all drawings: counts, sizes, regions, levels of detail."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .regions import REGIONS, regions_of
 
 @dataclass(frozen=True)
 class Lod:
-    """One level of detail: joints of each region, and how much is evaluated."""
+    """One level of detail: joints of each region, and the amount of evaluation."""
 
     joints: dict[str, int]
     coefficients: int
@@ -28,7 +28,7 @@ class Lod:
 
 @dataclass(frozen=True)
 class Facts:
-    """A rig as the drawing modules need it. `title` and `file_name` are for people."""
+    """A rig's data for the drawing modules. `title` and `file_name` are for people."""
 
     dna: risorius.Dna
     title: str
@@ -52,7 +52,7 @@ class Facts:
 
     @property
     def stored(self) -> int:
-        """Coefficients that the joint groups hold, zeros too."""
+        """Coefficients stored in the joint groups, zeros included."""
         return sum(int(group.values.size) for group in self.dna.joint_groups)
 
     @property
@@ -60,7 +60,7 @@ class Facts:
         return sum(int(np.count_nonzero(group.values)) for group in self.dna.joint_groups)
 
     def region_counts(self) -> dict[str, int]:
-        """Joints of each region that has any, in the order of REGIONS."""
+        """Number of joints of each non-empty region, in the order of REGIONS."""
         votes = Counter(self.joint_regions)
         return {region: votes[region] for region in REGIONS if votes[region]}
 
@@ -71,8 +71,8 @@ def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = N
     Args:
         dna: read from `data` with all layers.
         data: the bytes of the file, for the sizes.
-        file_name: shown; no folder.
-        title: in place of the character's name.
+        file_name: for display, without folder.
+        title: replaces the character's name.
     """
     regions = regions_of(dna.joint_names)
     return Facts(
@@ -89,7 +89,7 @@ def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = N
 
 
 def listed(mapping: risorius.LodMapping, lod: int) -> npt.NDArray[np.int64]:
-    """int64[listed]: the indices that a mapping lists for a lod, none where it has no such LOD."""
+    """int64[listed]: the indices that a mapping lists for `lod`; empty if it lacks this LOD."""
     return np.asarray(mapping[lod] if lod < len(mapping) else [], np.int64)
 
 
@@ -109,7 +109,7 @@ def _lod(dna: risorius.Dna, level: int, regions: list[str]) -> Lod:
 
 
 def counts(facts: Facts) -> list[tuple[str, int]]:
-    """Everything that is counted, in the order of the table."""
+    """All counts, in the order of the table."""
     dna, meshes = facts.dna, facts.dna.meshes
     targets = [target for mesh in meshes for target in mesh.blend_shape_targets]
     return [
@@ -134,7 +134,7 @@ def counts(facts: Facts) -> list[tuple[str, int]]:
 
 
 def human_bytes(size: int) -> str:
-    """A size in the unit that gives two to four figures; decimal units."""
+    """A size in a decimal unit with two to four digits."""
     if size < 1000:
         return f"{size} B"
     if size < 1_000_000:
@@ -143,7 +143,7 @@ def human_bytes(size: int) -> str:
 
 
 def descriptor(facts: Facts) -> str:
-    """A line on who this is."""
+    """A line about the character."""
     dna = facts.dna
     parts = [
         f"DNA {dna.generation}.{dna.version}",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How many bytes each layer takes, read from the container of the file itself."""
+"""The size of each layer in bytes, read from the file's container."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SECTIONS_OF_2_1 = (
 
 @dataclass(frozen=True)
 class Layer:
-    """A stretch of the file. `key` is the four letters of the index table, or empty."""
+    """A part of the file. `key` is the four letters of the index table, or empty."""
 
     key: str
     title: str
@@ -43,7 +43,7 @@ class Layer:
 
 @dataclass(frozen=True)
 class Extras:
-    """What only the newer layers count: controls behind raw and correctives, and networks."""
+    """Counts in the newer layers: controls after raw ones and correctives, and networks."""
 
     ml_controls: int
     rbf_poses: int
@@ -84,7 +84,7 @@ class _Bytes:
 
 
 def read_layers(data: bytes) -> list[Layer]:
-    """The layers in file order; their sizes and that of what lies between add up to the file's.
+    """The layers in file order; with the gaps between them they add up to the file's size.
 
     Args:
         data: the bytes of a DNA file that `risorius.load` accepts.
@@ -96,7 +96,7 @@ def read_layers(data: bytes) -> list[Layer]:
 
 def _sections_of_2_1(data: bytes) -> list[Layer]:
     offsets = struct.unpack_from(">8I", data, 7)
-    # The third offset is that of "behavior", which has no body of its own.
+    # The third offset is for "behavior", which has no bytes of its own.
     starts = [offsets[0], offsets[1], *offsets[3:8], len(data) - 3]
     layers = [Layer("", "header", 0, 39)]
     for title, (start, end) in zip(_SECTIONS_OF_2_1, pairwise(starts), strict=True):
@@ -115,7 +115,7 @@ def _entries(data: bytes) -> list[Layer]:
 
 
 def _with_gaps(layers: list[Layer], end: int) -> list[Layer]:
-    """The layers, and as a last one the bytes that none of them covers."""
+    """The layers, followed by an entry for bytes outside of all layers."""
     covered, at = 0, 0
     for layer in layers:
         stop = min(end, layer.offset + layer.size)
@@ -127,7 +127,7 @@ def _with_gaps(layers: list[Layer], end: int) -> list[Layer]:
 
 
 def read_extras(data: bytes) -> Extras:
-    """Counts from the layers of networks and RBF poses; 0 for what is absent or damaged."""
+    """Counts from the layers of networks and RBF poses; 0 for absent or damaged layers."""
     if int.from_bytes(data[5:7], "big") == 1:
         return Extras(0, 0, 0)
     bodies = {x.key: data[x.offset : x.offset + x.size] for x in _entries(data) if x.key}
@@ -151,7 +151,7 @@ def _machine_learning(body: bytes) -> tuple[int, int]:
 
 
 def _pose_controls(bodies: dict[str, bytes]) -> int:
-    """The number of controls that RBF poses write; files of 2.4 have one for each pose."""
+    """The number of controls that RBF poses write; a 2.4 file has one per pose."""
     try:
         reader = _Bytes(bodies.get("rbfe", b""))
         if names := reader.u32():

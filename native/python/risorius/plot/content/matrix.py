@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joint matrix as an image: which coefficient stands where, and in which colour."""
+"""The joint matrix as an image: position and colour of each coefficient."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Block:
 
 
 def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
-    """The region of each joint group: where most of the joints lie that its rows move.
+    """The region of each joint group: the one of most of the joints that it moves.
 
     Args:
         dna: the face.
@@ -55,21 +55,21 @@ def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
 
 
 def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
-    """Rows and columns that hold every coefficient of dna: at least 9 a joint x `controls`."""
+    """Rows and columns that contain every coefficient of dna: at least 9 per joint x `controls`."""
     rows, columns = 9 * len(dna.joint_names), controls
     for group in dna.joint_groups:
-        # As 64-bit numbers: -1 among unsigned 16-bit ones would be 65,535.
+        # 64-bit, because -1 as an unsigned 16-bit number would be 65,535.
         rows = max(rows, int(np.max(group.output_indices.astype(np.int64), initial=-1)) + 1)
         columns = max(columns, int(np.max(group.input_indices.astype(np.int64), initial=-1)) + 1)
     return rows, columns
 
 
 def by_index(dna: risorius.Dna, controls: int) -> Cells:
-    """The joint matrix of dna as it is: row 9 * joint + attribute, column = control.
+    """The joint matrix of dna by index: row 9 * joint + attribute, column = control.
 
     Args:
         dna: the face.
-        controls: how many columns it has at least.
+        controls: least number of columns.
     """
     parts = []
     for number, group in enumerate(dna.joint_groups):
@@ -80,14 +80,14 @@ def by_index(dna: risorius.Dna, controls: int) -> Cells:
 
 
 def regrouped(dna: risorius.Dna, regions: Sequence[str]) -> tuple[Cells, list[Block]]:
-    """The rows of a group together, region by region, and its columns pushed to the left.
+    """Rows grouped by joint group and region, with each group's columns moved to the left.
 
     Args:
         dna: a rig.
-        regions: of each joint group.
+        regions: regions of each joint group.
 
     Returns:
-        The cells, and the rectangle of each group that has one: what the evaluator stores.
+        The cells, and the rectangle of each non-empty group, as the evaluator stores it.
     """
     groups = dna.joint_groups
     order = sorted(range(len(groups)), key=lambda g: (REGIONS.index(regions[g]), g))
@@ -113,13 +113,13 @@ def _joined(parts: Sequence[tuple[npt.NDArray[Any], ...]], shape: tuple[int, int
 
 
 def image(cells: Cells, colors: Floats, limit: tuple[int, int]) -> npt.NDArray[np.uint8]:
-    """The cells as a picture, the empty ones transparent.
+    """The cells as a picture; empty cells are transparent.
 
     Args:
-        cells: what to draw.
+        cells: the cells.
         colors: float64[groups, 3] in 0..1.
-        limit: the most rows and columns of pixels. A grid that fits has one pixel a cell; else
-            a pixel holds several, in their mean colour, the fuller the more opaque.
+        limit: the most rows and columns of pixels. A smaller grid has one pixel per cell; otherwise
+            a pixel shows the mean colour of several cells, more opaque the more are filled.
 
     Returns:
         uint8[h, w, 4], RGBA.
@@ -134,13 +134,13 @@ def image(cells: Cells, colors: Floats, limit: tuple[int, int]) -> npt.NDArray[n
         shade = colors[cells.groups, channel] if len(cells.groups) else np.zeros(0)
         picture[:, channel] = np.bincount(flat, shade, minlength=size) / np.maximum(count, 1)
     area = np.outer(_spread(cells.shape[0], high), _spread(cells.shape[1], wide)).ravel()
-    # A lone coefficient among fifty zeros must still be seen, hence the floor.
+    # The floor keeps a single coefficient among fifty zeros visible.
     fill = np.sqrt(np.minimum(1, count / area))
     picture[:, 3] = np.where(count > 0, 0.3 + 0.7 * fill, 0)
     return np.asarray(np.rint(picture * 255), np.uint8).reshape(high, wide, 4)
 
 
 def _spread(cells: int, pixels: int) -> Floats:
-    """How many cells fall on each pixel: float64[pixels]."""
+    """The number of cells on each pixel: float64[pixels]."""
     places = np.arange(max(1, cells)) * pixels // max(1, cells)
     return np.bincount(places, minlength=pixels).astype(float)

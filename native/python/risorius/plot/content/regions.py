@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Face regions of joints, read from their names, and a colour for each."""
+"""Face regions of joints, derived from their names, and a colour for each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REGIONS = (
     "neck",
     "other",
 )
-# Middle lightness, so that one colour reads on white paper and on a dark screen.
+# Medium lightness, so that each colour is visible on white paper and on a dark screen.
 COLORS = {
     "forehead, brow": "#8f6be0",
     "eye": "#2e86de",
@@ -32,7 +32,7 @@ COLORS = {
     "neck": "#54a24b",
     "other": "#8b95a1",
 }
-# The order decides: NasolabialBulge is a cheek though it begins like a nose, UnderChin a chin,
+# The order matters: NasolabialBulge is a cheek though it begins like a nose, UnderChin a chin,
 # EyelashesUpper an eye, a joint of the upper lip's rotation a mouth.
 _STARTS = (
     ("cheek", ("naso", "cheek", "masseter", "sideburn", "temple")),
@@ -45,7 +45,7 @@ _STARTS = (
     ("ear", ("ear",)),
     ("neck", ("neck", "adams", "throat", "clavicle", "spine")),
 )
-# FACIAL_L_12IPV_EyelidUpperB1: side and kind say nothing about the place.
+# FACIAL_L_12IPV_EyelidUpperB1: side and kind do not tell the region.
 _PREFIX = re.compile(r"^(?:facial_)?(?:[lrc]_)?(?:12ipv_)?", re.IGNORECASE)
 
 
@@ -64,13 +64,13 @@ def regions_of(joints: Iterable[str]) -> list[str]:
 
 
 def majority(indices: Iterable[int], regions: Sequence[str]) -> str:
-    """The region that most of some joints lie in; of equals the one that REGIONS names first.
+    """The region of most of the joints; on a tie the first one in REGIONS.
 
     Args:
-        indices: of joints; those beyond the end are passed over.
-        regions: of every joint.
+        indices: indices of joints; indices out of range are ignored.
+        regions: regions of every joint.
     """
     votes = Counter(regions[i] for i in indices if 0 <= i < len(regions))
     named = [region for region in REGIONS[:-1] if votes[region]]
-    # "other" wins only where no joint has a named region: one root joint among lips does not count.
+    # "other" wins only if no joint has a named region: one root joint among lips does not count.
     return max(named, key=lambda region: votes[region]) if named else "other"

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Headings and captions: what one sees, in a sentence, for the page and the sheet alike."""
+"""Headings and captions of the drawings, for the page and the sheet."""
 
 from __future__ import annotations
 
 from .facts import Facts, human_bytes
 
 FACE = "The face at rest"
-MATRIX = "What moves the joints"
+MATRIX = "Joint matrix"
 LODS = "Levels of detail"
-SIZES = "What the file is made of"
+SIZES = "Size of each part"
 
 
 def face(lod: int) -> str:
@@ -32,7 +32,7 @@ def matrix(facts: Facts) -> str:
 def lods() -> str:
     return (
         "A coarser level keeps fewer joints, and so evaluates fewer coefficients, channels and "
-        "maps: what a face far from the camera costs."
+        "maps: a face far from the camera costs less."
     )
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The single drawings of a page."""
+"""The individual drawings of a page."""

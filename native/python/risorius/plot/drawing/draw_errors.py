@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Expressions in colour: how far a face is from what it was made from."""
+"""Expressions coloured by error: the distance of a face from its source."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .paper import MUTED, Canvas
 Floats = npt.NDArray[np.float64]
 
 COLUMNS = 6
-_HEAD = 0.62  # inches over a picture, for its name
-_BAR = 0.75  # inches under all, for the scale
-# From clay over yellow and red to violet: the worst places are found at a glance.
+_HEAD = 0.62  # inches above a picture, for its name
+_BAR = 0.75  # inches below all pictures, for the scale
+# From clay over yellow and red to violet, so that the worst places stand out.
 _STOPS = np.array([0.0, 0.2, 0.45, 0.75, 1.0])
 _COLORS = np.array(
     [[1.0, 1.0, 1.0], [1.0, 0.93, 0.55], [1.0, 0.6, 0.2], [0.85, 0.15, 0.25], [0.45, 0.05, 0.5]]
@@ -28,7 +28,7 @@ _COLORS = np.array(
 
 @dataclass(frozen=True)
 class Expression:
-    """A control at 1: its meshes as they are to be, and how far each vertex is from there."""
+    """A control at 1: its target meshes, and the error of each vertex."""
 
     name: str
     meshes: list[risorius.Mesh]
@@ -38,22 +38,22 @@ class Expression:
 
 
 def colors(errors: Floats, most: float) -> Floats:
-    """float64[V, 3] of errors: no error is clay, `most` and beyond the end of the scale.
+    """float64[V, 3], colours of errors: 0 is clay, `most` and more the end of the scale.
 
     Args:
         errors: float64[V].
-        most: the end of the scale, of the same unit.
+        most: the end of the scale, in the same unit.
     """
     share = np.clip(errors / most, 0, 1)
     return np.stack([np.interp(share, _STOPS, _COLORS[:, c]) for c in range(3)], axis=1)
 
 
 def height(count: int, width: float) -> float:
-    """Inches that so many pictures need.
+    """Inches for this number of pictures.
 
     Args:
-        count: of expressions.
-        width: of the canvas, inches.
+        count: number of expressions.
+        width: width of the canvas, inches.
     """
     return -(-max(count, 1) // COLUMNS) * (1.25 * width / COLUMNS + _HEAD) + _BAR
 
@@ -61,14 +61,14 @@ def height(count: int, width: float) -> float:
 def draw(
     canvas: Canvas, dna: risorius.Dna, expressions: Sequence[Expression], most: float, dpi: int
 ) -> None:
-    """A head for each expression, all to one scale.
+    """A head for each expression, all on one scale.
 
     Args:
-        canvas: to fill.
+        canvas: the canvas.
         dna: has the axes.
-        expressions: in the order in which they are drawn.
+        expressions: in drawing order.
         most: the error at the end of the scale, mm.
-        dpi: of the images.
+        dpi: resolution of the images.
     """
     if not expressions:
         canvas.say("No expression moves this face.")
@@ -103,4 +103,4 @@ def draw(
     ramp = colors(np.linspace(0, most, 256), most)[None]
     scale.imshow(ramp, extent=(0, most, 0, 1), aspect="auto")
     scale.set_yticks([])
-    scale.set_xlabel("mm from what was asked for", color=MUTED)
+    scale.set_xlabel("mm from the requested shape", color=MUTED)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The face in neutral from the front and the side, with its joints and bones."""
+"""The neutral face from the front and the side, with its joints and bones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .paper import MUTED, Canvas, heading, rgb
 
 Floats = npt.NDArray[np.float64]
 
-# Clear films and hair, which a renderer draws see-through: as clay they would hide the face.
+# Transparent films and hair, which would hide the face if drawn as clay.
 _FILMS = (
     "eyeshell",
     "cornea",
@@ -35,7 +35,7 @@ _MARGIN = 0.04
 
 @dataclass(frozen=True)
 class Scene:
-    """What the two views share, in view axes: right, up, front; file units."""
+    """The data of both views, in view axes (right, up, front) and file units."""
 
     shape: shade.Surface
     joints: Floats
@@ -44,10 +44,10 @@ class Scene:
 
 
 def scene(facts: Facts, lod: int) -> Scene:
-    """The meshes and joints of one level of detail, turned to look at us.
+    """The meshes and joints of one level of detail, turned to face the viewer.
 
     Args:
-        facts: of the face.
+        facts: facts of the face.
         lod: from 0.
     """
     dna = facts.dna
@@ -65,7 +65,7 @@ def scene(facts: Facts, lod: int) -> Scene:
 
 
 def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]]:
-    """The meshes of a level without the clear films, unless there is nothing else."""
+    """The meshes of a level without transparent films, unless there are no others."""
     wanted = listed(dna.lod_mesh_mapping, lod).tolist()
     found = [(dna.mesh_names[i], dna.meshes[i]) for i in wanted if i < len(dna.meshes)]
     solid = [(name, mesh) for name, mesh in found if not name.lower().startswith(_FILMS)]
@@ -74,7 +74,7 @@ def _meshes(dna: risorius.Dna, lod: int) -> tuple[list[str], list[risorius.Mesh]
 
 
 def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
-    """The lightness of each vertex: float64[V]. An eyeball looks at us by an iris and a pupil."""
+    """The lightness of each vertex: float64[V]. An eyeball gets an iris and a pupil."""
     points = np.asarray(mesh.positions, float).reshape(-1, 3) @ axes
     tone = np.ones(len(points))
     if not name.lower().startswith("eye") or not len(points):
@@ -90,19 +90,19 @@ def _paint(name: str, mesh: risorius.Mesh, axes: Floats) -> Floats:
 
 
 def draw(canvas: Canvas, facts: Facts, lod: int, dpi: int) -> None:
-    """Both views, to one scale.
+    """Both views, on one scale.
 
     Args:
-        canvas: to fill.
-        facts: of the rig.
+        canvas: the canvas.
+        facts: facts of the rig.
         lod: the level of detail of meshes and joints.
-        dpi: of the images.
+        dpi: resolution of the images.
     """
     seen = scene(facts, lod)
     if not len(seen.joints) and not len(seen.shape.triangles):
         canvas.say("This file has neither meshes nor joints.")
         return
-    # From the side the right of the picture is the back of the head.
+    # In the side view, the right of the picture is the back of the head.
     side = _turned(seen, np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]], float))
     frames = [frame_of(seen), frame_of(side)]
     bottom, top = min(f[2] for f in frames), max(f[3] for f in frames)
@@ -135,20 +135,20 @@ def _words(seen: Scene) -> str:
 
 
 def frame_of(seen: Scene) -> tuple[float, float, float, float]:
-    """Left, right, bottom, top that hold the meshes, and the joints that are not far from them."""
+    """Left, right, bottom, top that contain the meshes, and joints that are near to them."""
     used = seen.shape.points[np.unique(seen.shape.triangles)]
     joints = seen.joints[seen.shown]
     if len(used):
         low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
-        # The root of a spine may lie metres below a head; the face is the subject.
+        # The root of a spine may be metres below a head; the face is the subject.
         reach = 0.1 * float((high - low).max())
         near = np.all((joints[:, :2] > low - reach) & (joints[:, :2] < high + reach), axis=1)
-        # Most joints elsewhere: then it is no face, and all of it is shown.
+        # If most joints lie elsewhere it is not a face, and everything is shown.
         used = np.concatenate([used, joints[near] if 2 * near.sum() >= len(near) else joints])
     else:
         used = joints
     low, high = used[:, :2].min(axis=0), used[:, :2].max(axis=0)
-    # A lone joint, or joints on one line, still get a picture with two sides.
+    # A single joint, or joints on one line, still give a picture with two dimensions.
     size = max(float((high - low).max()), 1e-3)
     pad = np.maximum(_MARGIN * size, (0.3 * size - (high - low)) / 2)
     (left, bottom), (right, top) = (low - pad).tolist(), (high + pad).tolist()
@@ -168,7 +168,7 @@ def _draw_view(
 
 
 def _draw_joints(axes: Axes, facts: Facts, seen: Scene) -> None:
-    """Far joints first and fainter, so that the near side of the head can be told."""
+    """Draw far joints first and fainter, so that the near side of the head is recognisable."""
     if not len(seen.shown):
         return
     order = seen.shown[np.argsort(seen.joints[seen.shown, 2], kind="stable")]
@@ -176,7 +176,7 @@ def _draw_joints(axes: Axes, facts: Facts, seen: Scene) -> None:
     depth = points[:, 2] - points[:, 2].min()
     near = 1 - 0.75 * (1 - depth / max(float(depth.max()), 1e-9))
     many = len(order) > 100
-    # Hundreds of bones start in one root: as strong as a few they would hide the face.
+    # Hundreds of bones start at one root: drawn as strongly as a few they would hide the face.
     width, alpha = (0.4, 0.3) if many else (1.4, 0.6)
     lines = [seen.joints[pair][:, :2] for pair in seen.bones]
     axes.add_collection(

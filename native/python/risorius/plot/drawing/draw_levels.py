@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every level of detail beside the others: its meshes as they are shaded, its joints by region."""
+"""All levels of detail side by side: shaded meshes, and joints by region."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ _HEAD = 0.62
 
 
 def height(count: int, width: float) -> float:
-    """Inches that so many levels need.
+    """Inches for this number of levels.
 
     Args:
-        count: of levels.
-        width: of the canvas, inches.
+        count: number of levels.
+        width: width of the canvas, inches.
     """
     return -(-max(count, 1) // COLUMNS) * (1.2 * width / COLUMNS + _HEAD)
 
@@ -30,10 +30,10 @@ def draw(canvas: Canvas, facts: Facts, words: Sequence[str], dpi: int) -> None:
     """A head for each level with its edges and joints.
 
     Args:
-        canvas: to fill.
-        facts: of the face.
+        canvas: the canvas.
+        facts: facts of the face.
         words: a line for each level.
-        dpi: of the images.
+        dpi: resolution of the images.
     """
     if not facts.lods:
         canvas.say("This file has no levels of detail.")
@@ -64,7 +64,7 @@ def draw(canvas: Canvas, facts: Facts, words: Sequence[str], dpi: int) -> None:
 
 
 def _edges(axes: object, seen: draw_face.Scene) -> None:
-    """The triangles that look at us, where they are few enough to be told apart."""
+    """The triangles that face the viewer, if they are few enough to be distinguishable."""
     points, triangles = seen.shape.points, seen.shape.triangles
     if not 0 < len(triangles) <= 6000:
         return

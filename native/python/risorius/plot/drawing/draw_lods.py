@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The levels of detail: joints by region, and how much is evaluated."""
+"""The levels of detail: joints by region, and the amount of evaluation."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .paper import ACCENT, MUTED, RULE, Canvas, compact, heading
 
 
 def draw(canvas: Canvas, facts: Facts) -> None:
-    """A large panel of joints, and three small ones of work per level.
+    """A large panel of joints, and three small ones for the work of each level.
 
     Args:
-        canvas: where to draw.
-        facts: of the face.
+        canvas: the canvas.
+        facts: facts of the face.
     """
     if not facts.lods:
         canvas.say("This file has no levels of detail.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sizes: a bar for each layer of the file, and on request the counts beside them."""
+"""The sizes: a bar for each layer of the file, optionally with the counts."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ def draw(canvas: Canvas, facts: Facts, with_counts: bool) -> None:
     """Bars of bytes.
 
     Args:
-        canvas: where to draw.
-        facts: of the face.
-        with_counts: the counts too, where no table stands beside the picture.
+        canvas: the canvas.
+        facts: facts of the face.
+        with_counts: also draw the counts, if there is no table beside the picture.
     """
     high, counted = canvas.height - 0.7, 3.1 if with_counts else 0.0
     _draw_bars(canvas.place(2.35, 0.2, canvas.width - 2.7 - counted, high), facts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The look that all drawings share, without touching Matplotlib's global state for good."""
+"""The style of all drawings; Matplotlib's global settings are restored afterwards."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from matplotlib.figure import FigureBase
 
 from ..content.regions import COLORS
 
-# These exact values are found again in the SVG text and become variables of the page's theme.
+# The page finds these exact values in the SVG text and replaces them with its theme's variables.
 INK = "#1d232b"
 MUTED = "#66707d"
 RULE = "#d4dae1"
@@ -51,13 +51,13 @@ _SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def settings() -> Iterator[None]:
-    """Our look inside, the caller's settings again outside."""
+    """Apply our style inside the context and restore the caller's settings afterwards."""
     log = logging.getLogger("matplotlib.font_manager")
     level = log.level
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(_SETTINGS)
-        # A character's name may be in letters that the font lacks: a box is drawn, no warning.
+        # A name may have letters that the font lacks: a box is drawn without a warning.
         warnings.filterwarnings("ignore", "Glyph")
         log.setLevel(logging.ERROR)
         try:
@@ -73,14 +73,14 @@ def rgb(region: str) -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Canvas:
-    """A figure, or a part of one, of a known size in inches: text keeps its distances."""
+    """A figure, or a part of one, with a size in inches, so that text keeps its distances."""
 
     figure: FigureBase
     width: float
     height: float
 
     def place(self, left: float, bottom: float, width: float, height: float) -> Axes:
-        """Axes with only a line below and to the left.
+        """Axes with only the lower and the left line.
 
         Args:
             left, bottom: of the axes, inches from the lower left of the canvas.
@@ -92,17 +92,17 @@ class Canvas:
         return axes
 
     def say(self, sentence: str) -> None:
-        """A sentence where there is nothing to draw."""
+        """A sentence in place of a drawing."""
         self.figure.text(0.5, 0.5, sentence, ha="center", va="center", color=MUTED, fontsize=12)
 
 
 def heading(axes: Axes, text: str, under: str = "") -> None:
-    """The name of a panel, flush left above it.
+    """The name of a panel, left-aligned above it.
 
     Args:
-        axes: of the panel.
+        axes: axes of the panel.
         text: the name.
-        under: a line of figures under the name.
+        under: a line of numbers under the name.
     """
     lift = 22 if under else 8
     axes.annotate(
@@ -117,7 +117,7 @@ def heading(axes: Axes, text: str, under: str = "") -> None:
 
 
 def compact(value: float) -> str:
-    """A count in few figures: 940, 5.2k, 1.08M."""
+    """A count with few digits: 940, 5.2k, 1.08M."""
     if value < 1000:
         return f"{value:.0f}"
     if value < 100_000:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Meshes as a softly lit picture: a small depth-buffer renderer in NumPy.
+"""Renders softly lit meshes: a small depth-buffer renderer in NumPy.
 
-Triangles are cut into rows of pixels, all at once, so the work grows with the pixels that are
-covered: a head of 50,000 triangles takes about a second, and nothing has to be thinned out.
+Triangles are cut into rows of pixels, all at once, so that the work grows with the covered pixels:
+a head of 50,000 triangles takes about a second without any simplification.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Ints = npt.NDArray[np.int64]
 
 _KEY = np.array([-0.35, 0.55, 0.76])  # light from above and a little from the left
 _FILL = np.array([0.8, 0.1, 0.6])
-_BATCH = 1 << 20  # pixels at a time, which bounds the memory at some 150 MB
+_BATCH = 1 << 20  # pixels at a time, which limits the memory to about 150 MB
 
 
 @dataclass(frozen=True)
 class Surface:
     """float64[V, 3] points and normals in view axes, int64[F, 3] triangles, and the paint of the
-    vertices: float64[V], lightness of clay, or float64[V, 3], a colour beside clay."""
+    vertices: float64[V], lightness of clay, or float64[V, 3], a colour that multiplies clay."""
 
     points: Floats
     normals: Floats
@@ -53,12 +53,12 @@ def corners_of(mesh: risorius.Mesh) -> Ints:
 
 
 def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> Surface:
-    """Meshes as one surface in view axes.
+    """Several meshes as one surface in view axes.
 
     Args:
-        meshes: to join.
-        paints: of each mesh, float64[V], the lightness of its vertices, 1 is clay; or of all
-            meshes float64[V, 3], a colour that clay is multiplied by.
+        meshes: the meshes.
+        paints: for each mesh float64[V], lightness of its vertices, 1 is clay; or for all meshes
+            float64[V, 3], a colour that multiplies clay.
         axes: float64[3, 3] from file axes to right, up, front.
     """
     points, triangles, paint, first = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], [], 0
@@ -75,14 +75,14 @@ def surface(meshes: list[risorius.Mesh], paints: list[Floats], axes: Floats) -> 
 
 
 def vertex_normals(points: Floats, triangles: Ints) -> Floats:
-    """Area-weighted vertex normals; the file's own may be missing or split along seams.
+    """Area-weighted vertex normals, because the file's may be missing or split along seams.
 
     Args:
         points: float64[V, 3].
         triangles: int64[F, 3].
 
     Returns:
-        float64[V, 3] of length 1, or 0 where no triangle has an area.
+        float64[V, 3] of length 1, or 0 if no triangle has an area.
     """
     a, b, c = (points[triangles[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
@@ -102,13 +102,13 @@ def render(
     """The surface seen along -z.
 
     Args:
-        shape: x to the right, y up, z towards who looks.
+        shape: x to the right, y up, z towards the viewer.
         frame: left, right, bottom, top of the picture in the surface's units.
-        height: of the picture in pixels; the width follows from the frame.
-        smooth: this many samples a pixel each way, averaged, so that edges are soft.
+        height: height of the picture in pixels; the width follows from the frame.
+        smooth: samples per pixel in each direction, which are averaged for soft edges.
 
     Returns:
-        uint8[h, w, 4], RGBA, transparent where there is nothing.
+        uint8[h, w, 4], RGBA, transparent outside of the surface.
     """
     left, right, bottom, top = frame
     scale = height * smooth / (top - bottom)
@@ -130,10 +130,10 @@ def render(
 
 
 def depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tuple[Ints, Floats]:
-    """The nearest triangle at each pixel, or -1, and the weights of its corners there.
+    """The nearest triangle at each pixel, or -1, and the barycentric weights of its corners.
 
     Args:
-        screen: float64[V, 3], x to the right and y down in pixels, z towards who looks.
+        screen: float64[V, 3], x to the right and y down in pixels, z towards the viewer.
         triangles: int64[F, 3].
         size: height and width in pixels.
 
@@ -158,7 +158,7 @@ def depth_buffer(screen: Floats, triangles: Ints, size: tuple[int, int]) -> tupl
 
 
 def _slopes(corners: Floats) -> Floats:
-    """The weight of each corner as a plane a x + b y + c: float64[F, 3, 3]; slivers are NaN."""
+    """The weight of each corner as a plane a x + b y + c: float64[F, 3, 3]; NaN for slivers."""
     ahead, behind = np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)
     along = ahead[:, :, 1] - behind[:, :, 1]
     across = behind[:, :, 0] - ahead[:, :, 0]
@@ -188,7 +188,7 @@ def _rows(
         low = np.where(along > 0, np.maximum(low, edge), low)
         end = np.where(along < 0, np.minimum(end, edge), end)
         end = np.where((along == 0) & (rest < -1e-9), -1.0, end)
-    # A little over the edge, so that no gap opens between two triangles that share it.
+    # Extends slightly over the edge, so that no gap opens between adjacent triangles.
     low = np.ceil(np.minimum(low, wide) - 1e-6).astype(np.int64)
     pixels = np.floor(np.maximum(end, -1) + 1e-6).astype(np.int64) - low + 1
     kept = pixels > 0
@@ -198,7 +198,7 @@ def _rows(
 def _batches(
     owner: Ints, row: Ints, low: Ints, count: Ints
 ) -> Iterator[tuple[Ints, Ints, Ints, Ints]]:
-    """The rows in runs of a bounded number of pixels."""
+    """The rows in batches of a limited number of pixels."""
     runs = np.cumsum(count) // _BATCH
     edges = [0, *(np.flatnonzero(np.diff(runs)) + 1).tolist(), len(owner)]
     for first, last in pairwise(edges):
@@ -221,7 +221,7 @@ def _lit(normals: Floats, paint: Floats) -> Floats:
 
 
 def _averaged(picture: Floats, smooth: int) -> npt.NDArray[np.uint8]:
-    """Blocks of samples as one pixel; the colour is the mean of what was hit, not of the void."""
+    """Average blocks of samples to pixels; the colour is the mean of covered samples only."""
     high, wide = picture.shape[0] // smooth, picture.shape[1] // smooth
     blocks = picture.reshape(high, smooth, wide, smooth, 4)
     alpha = blocks[..., 3].mean(axis=(1, 3))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Where the joints are in the neutral pose, and the file's axes turned so that a face looks at us.
+"""Joint positions in the neutral pose, and the file's axes turned so that the face looks at the
+viewer.
 
-Row vectors as everywhere in DNA files: v' = v * M.
+Row vectors, as everywhere in DNA files: v' = v * M.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from risorius.rigs.rotation import Convention
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# right, up, front: x to the right of who looks at the face, y up, z out of the picture.
+# right, up, front: x to the viewer's right, y up, z out of the picture.
 _DIRECTIONS = {
     "left": (-1, 0, 0),
     "right": (1, 0, 0),
@@ -29,12 +30,12 @@ _DIRECTIONS = {
 def view_axes(dna: risorius.Dna) -> Floats:
     """The matrix from file axes to (right, up, front): float64[3, 3], a point is p @ matrix."""
     matrix = np.array([_DIRECTIONS.get(a, (0, 0, 0)) for a in dna.coordinate_system], float)
-    # Axes that are not independent give no frame; the usual y up is then the best guess.
+    # Dependent axes give no frame; the usual y up is then the best guess.
     return matrix if abs(np.linalg.det(matrix)) > 0.5 else np.eye(3)
 
 
 def rotations(dna: risorius.Dna) -> Floats:
-    """The neutral rotation of each joint against its parent: float64[J, 3, 3], row vectors."""
+    """The neutral rotation of each joint relative to its parent: float64[J, 3, 3], row vectors."""
     convention = Convention.of(dna)
     angles = _rows(dna.neutral_joint_rotations, len(dna.joint_names))
     angles = angles * convention.radians * convention.signs
@@ -45,7 +46,7 @@ def rotations(dna: risorius.Dna) -> Floats:
 
 
 def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
-    """float64[count, 3], zero where the file has fewer rows than joints."""
+    """float64[count, 3], zero for missing rows."""
     rows = np.zeros((count, 3))
     given = np.asarray(values, float).reshape(-1, 3)[:count]
     rows[: len(given)] = np.nan_to_num(given, posinf=0.0, neginf=0.0)
@@ -53,7 +54,7 @@ def _rows(values: npt.NDArray[np.float32], count: int) -> Floats:
 
 
 def _about(axis: int, angles: Floats) -> Floats:
-    """Turns about one axis, radians: float64[J, 3, 3]."""
+    """Rotations about one axis by angles in radians: float64[J, 3, 3]."""
     one, two = (axis + 1) % 3, (axis + 2) % 3
     turn = np.zeros((len(angles), 3, 3))
     turn[:, axis, axis] = 1
@@ -63,7 +64,7 @@ def _about(axis: int, angles: Floats) -> Floats:
 
 
 def parents(dna: risorius.Dna) -> Ints:
-    """int64[J]; a joint with no usable parent is its own, as a root is in the file."""
+    """int64[J]; a joint without a valid parent is its own parent, like a root."""
     count = len(dna.joint_names)
     own = np.arange(count)
     found = np.asarray(dna.joint_parents, np.int64)[:count]
@@ -81,10 +82,10 @@ def world_positions(dna: risorius.Dna) -> Floats:
     positions, turns = _rows(dna.neutral_joint_translations, len(above)), rotations(dna)
     done = above == np.arange(len(above))
     while not done.all():
-        # A whole generation at a time: the depth of a face is small, its width is not.
+        # One generation at a time, because a face's hierarchy is wide and shallow.
         ready = ~done & done[above]
         if not ready.any():
-            break  # parents in a circle: their joints keep their local positions
+            break  # parents in a cycle: their joints keep local positions
         up = above[ready]
         positions[ready] = np.einsum("ni,nij->nj", positions[ready], turns[up]) + positions[up]
         turns[ready] = turns[ready] @ turns[up]

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: MIT
+"""A face of another form: each layer of a DNA file follows where the vertices of its skin lie.
+
+Names, counts and layers stay, so a program that takes the old file takes the new one.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import BlendShapeTarget, Dna, Mesh
+from ...author.geometry import skeleton as sk
+from ...author.geometry.skeleton import FARTHEST, Doubles
+from ...base.errors import ArgumentError
+from ..errors import Stopped
+from .change import Change, similar, surface_of
+from .joints import Places, place_joints, shifts_carried
+from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
+
+Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
+
+
+class Moved(NamedTuple):
+    """A mesh on both heads: float64[V, 3], float64[V, 3], float64[V, 3, 3]."""
+
+    before: Doubles
+    after: Doubles
+    linear: Doubles
+
+
+def conform(
+    dna: Dna,
+    moved: Mapping[str, Doubles],
+    progress: Progress | None = None,
+    balls: Sequence[Ball] = (),
+) -> Dna:
+    """The face with another head's form: the same names, counts and layers.
+
+    Meshes that `moved` does not name follow the skin: what lies on it by the nearest place, eyes as
+    spheres in their lids, teeth and tongue as one piece. Joints follow what they carry, blend
+    shapes and shifts of joints the local change of form. What turns joints, and layers of solvers
+    and networks, stay as they are.
+
+    Args:
+        dna: stays as it is.
+        moved: float64[V, 3] by mesh name, in the file's axes and unit: where vertices lie now;
+            the skin of LOD 0 at least.
+        progress: told the share that is done, 0 to 1; False stops.
+        balls: eyes of the other head, which those of the face take the places of.
+
+    Raises:
+        ArgumentError: the face has no skin, or `moved` lacks it, names another mesh, or has
+            places of another number or that are no places.
+        Stopped: progress said False.
+    """
+    tell = telling(progress, 0.0, 1.0)
+    skin = skin_of(dna)
+    given = _checked(dna, moved, skin)
+    before = np.asarray(dna.meshes[skin].positions, np.float64)
+    change = Change(dna.meshes[skin], before, given[dna.mesh_names[skin]])
+    tell(0.2)
+    world = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
+    stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth_way(dna, change))
+    meshes: dict[int, Moved] = {}
+    for m in range(min(len(dna.meshes), len(dna.mesh_names))):
+        if len(dna.meshes[m].positions):
+            meshes[m] = _moved(dna, m, change, stiff, given)
+        tell(0.2 + 0.5 * (m + 1) / len(dna.meshes))
+    places = Places(dna, {m: meshes[m] for m in finest(dna)}, change, stiff)
+    out = copy.copy(dna)
+    out.meshes = [
+        _mesh(mesh, meshes[m]) if m in meshes else mesh for m, mesh in enumerate(dna.meshes)
+    ]
+    tell(0.9)
+    place_joints(out, places, change.turn)
+    out.joint_groups = shifts_carried(dna, places, change.turn)
+    tell(1.0)
+    return out
+
+
+def telling(progress: Progress | None, begin: float, end: float) -> Callable[[float], bool]:
+    """What tells the progress of a part of the work. Raises: Stopped: it said False.
+
+    Args:
+        progress: of the whole.
+        begin: share of the whole where the part begins.
+        end: where it ends.
+    """
+
+    def tell(share: float) -> bool:
+        if progress is not None and progress(begin + (end - begin) * share) is False:
+            raise Stopped
+        return True
+
+    return tell
+
+
+def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Doubles]:
+    if skin < 0:
+        raise ArgumentError("a face with a mesh of skin at LOD 0 was expected, found none")
+    if dna.mesh_names[skin] not in moved:
+        raise ArgumentError(f"places of {dna.mesh_names[skin]}, the skin, were expected")
+    counts = {n: len(m.positions) for n, m in zip(dna.mesh_names, dna.meshes, strict=False)}
+    out = {}
+    for name, points in moved.items():
+        if name not in counts:
+            raise ArgumentError(f"{name}: a mesh of the face was expected")
+        out[name] = np.asarray(points, np.float64)
+        if out[name].shape != (counts[name], 3):
+            raise ArgumentError(
+                f"{name}: {counts[name]:,} places were expected, found {len(out[name]):,}"
+            )
+        if not (np.abs(out[name]) <= FARTHEST).all():
+            raise ArgumentError(f"{name}: a vertex lies at no place that a number can say")
+    own = out[dna.mesh_names[skin]]
+    if np.ptp(own, axis=0).max() <= 0:
+        raise ArgumentError(f"{dna.mesh_names[skin]}: all vertices lie at one place")
+    return out
+
+
+def _moved(dna: Dna, m: int, change: Change, stiff: Stiff, given: Mapping[str, Doubles]) -> Moved:
+    name, mesh = dna.mesh_names[m], dna.meshes[m]
+    points = np.asarray(mesh.positions, np.float64)
+    if m == stiff.skin:
+        return Moved(points, given[name], change.linear)
+    of = kind(name)
+    if of == "eyes" and stiff.eyes:
+        moved = _with_eyes(points, stiff.eyes)
+    elif of == "mouth" and stiff.mouth is not None:
+        way = similar(points, given[name], change) if name in given else stiff.mouth
+        moved = Moved(points, way(points), np.tile(way.linear, (len(points), 1, 1)))
+    else:
+        moved = _on_skin(mesh, points, change, stiff.eyes)
+    return moved._replace(after=given[name]) if name in given else moved
+
+
+def _with_eyes(points: Doubles, eyes: Sequence[Eye]) -> Moved:
+    """Each vertex goes with the eye whose middle is nearest."""
+    far = np.stack([np.linalg.norm(points - eye.middle, axis=1) for eye in eyes])
+    own = far.argmin(axis=0)
+    after = np.stack([eye.way(points) for eye in eyes])
+    linear = np.stack([eye.way.linear for eye in eyes])
+    return Moved(points, after[own, np.arange(len(points))], linear[own])
+
+
+def _on_skin(mesh: Mesh, points: Doubles, change: Change, eyes: Sequence[Eye]) -> Moved:
+    """Vertices on the nearest place of the skin; those that an eye's joints hold, on the eye."""
+    hold = change.hold(points, mesh)
+    linear = change.at(hold)
+    after = change.carried(hold, linear)
+    for eye in eyes:
+        own = stiff_share(mesh, eye.holds)
+        after[own], linear[own] = eye.way(points[own]), eye.way.linear
+    return Moved(points, after, linear)
+
+
+def _mesh(mesh: Mesh, moved: Moved) -> Mesh:
+    out = copy.copy(mesh)
+    out.positions = moved.after
+    out.normals = _normals(mesh, moved)
+    out.blend_shape_targets = [_target(t, moved.linear) for t in mesh.blend_shape_targets]
+    return out
+
+
+def _target(target: BlendShapeTarget, linear: Doubles) -> BlendShapeTarget:
+    at = np.asarray(target.vertex_indices, np.int64)
+    deltas = np.asarray(target.deltas, np.float64)
+    out = copy.copy(target)
+    out.deltas = np.einsum("nij,nj->ni", linear[at], deltas)
+    return out
+
+
+def _normals(mesh: Mesh, moved: Moved) -> Doubles:
+    """float64[N, 3]: the normals of the file, each turned as the surface at its vertex turns."""
+    own = np.asarray(mesh.normals, np.float64)
+    rows = np.asarray(mesh.layout_normals, np.int64)
+    vertex = np.full(len(own), -1)
+    vertex[rows] = np.asarray(mesh.layout_positions, np.int64)
+    used = vertex >= 0
+    flat, bent = (
+        surface_of(mesh, points).normals()[vertex[used]] for points in (moved.before, moved.after)
+    )
+    out = own.copy()
+    out[used] = _turned(own[used], flat, bent)
+    return out
+
+
+def _turned(vectors: Doubles, start: Doubles, end: Doubles) -> Doubles:
+    """float64[n, 3]: vectors after the shortest turns that bring unit vectors to others."""
+    axis = np.cross(start, end)
+    cosine = np.einsum("ni,ni->n", start, end)[:, None]
+    crossed = np.cross(axis, vectors)
+    out = vectors + crossed + np.cross(axis, crossed) / np.maximum(1 + cosine, 1e-6)
+    return np.where(cosine > -0.999, out, -vectors)

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: MIT
+"""Where joints lie on the other head, and how far controls shift them there.
+
+Joints keep their directions, so what turns them means the same; a head that is turned as a whole
+turns its roots. What shifts them changes as the skin that they carry.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ... import Dna, JointGroup
+from ...author.geometry import skeleton as sk
+from ...author.geometry.skeleton import Doubles
+from ...rigs.rotation import Convention
+from .change import Change
+from .parts import Stiff, finest, kind
+
+_HELD = 1e-6  # the weight of all vertices from which on a joint has a place by them
+_SOME = 0.05  # of the meshes in the mouth: what a jaw carries at least, and leaves to the head
+Carried = Mapping[int, tuple[Doubles, Doubles, Doubles]]  # mesh -> before, after, linear
+
+
+class Places:
+    """Of all joints.
+
+    Attributes:
+        before, after: float64[J, 3], where they are in the world.
+        linear: float64[J, 3, 3], the change of form about each.
+    """
+
+    def __init__(self, dna: Dna, carried: Carried, change: Change, stiff: Stiff) -> None:
+        """Finds them.
+
+        Args:
+            dna: the face.
+            carried: vertices of meshes of the finest level.
+            change: of its skin.
+            stiff: parts of the face.
+        """
+        count = len(dna.joint_names)
+        frames = sk.world_matrices(dna, np.zeros((count, 9)))
+        self.turns, self.before = frames[:, :3, :3], frames[:, :3, 3]
+        sums = _means(dna, carried)
+        none = np.flatnonzero(np.isnan(sums[:, 0]))
+        for joint in none.tolist():  # nothing hangs on any of its line
+            way = change.around(self.before[joint], change.reach)
+            sums[joint] = np.concatenate([way.middle, way.becomes, way.linear.ravel()])
+        self.linear = sums[:, 6:].reshape(-1, 3, 3)
+        away = self.before - sums[:, :3]
+        self.after = sums[:, 3:6] + np.einsum("jik,jk->ji", self.linear, away)
+        for eye in stiff.eyes:
+            own = list(eye.joints)
+            self.after[own] = eye.way(self.before[own])
+        inside = [m for m in carried if kind(dna.mesh_names[m]) == "mouth"]
+        jaw = jaw_of(dna, inside)
+        if stiff.mouth is not None and jaw >= 0:  # a jaw is one piece with its teeth
+            self.after[jaw] = stiff.mouth(self.before[jaw])
+
+
+def _means(dna: Dna, carried: Carried) -> Doubles:
+    """float64[J, 15]: means over what each joint carries, of before, after and the change.
+
+    A joint that carries nothing is as those below it, or as the one above; NaN: none carries any.
+    """
+    count = len(dna.joint_names)
+    sums, held = np.zeros((count, 15)), np.zeros(count)
+    for m in finest(dna):
+        if m not in carried:
+            continue
+        vertex, joint, weight = sk.skin_entries(dna.meshes[m])
+        rows = np.concatenate([part.reshape(len(part), -1) for part in carried[m]], axis=1)[vertex]
+        held += np.bincount(joint, weights=weight, minlength=count)
+        for k in range(15):
+            sums[:, k] += np.bincount(joint, weights=weight * rows[:, k], minlength=count)
+    out = np.full_like(sums, np.nan)
+    own = held > _HELD
+    out[own] = sums[own] / held[own, None]
+    order = sk.parent_order(dna)
+    below, many = np.zeros((count, 15)), np.zeros(count)
+    for at in reversed(order):
+        if np.isnan(out[at, 0]) and many[at]:
+            out[at] = below[at] / many[at]
+        parent = int(dna.joint_parents[at])
+        if parent != at and not np.isnan(out[at, 0]):
+            below[parent] += out[at]
+            many[parent] += 1
+    for at in order:
+        if np.isnan(out[at, 0]):
+            out[at] = out[int(dna.joint_parents[at])]
+    return out
+
+
+def place_joints(out: Dna, places: Places, turn: Doubles) -> None:
+    """Writes the neutral pose.
+
+    Args:
+        out: gets it; has the tree and the old one.
+        places: of its joints.
+        turn: float64[3, 3] of the whole head.
+    """
+    parents = np.asarray(out.joint_parents, np.int64)
+    roots = parents == np.arange(len(parents))
+    above = np.where(roots[:, None, None], np.eye(3), turn @ places.turns[parents])
+    from_above = np.where(roots[:, None], places.after, places.after - places.after[parents])
+    out.neutral_joint_translations = np.einsum("jki,jk->ji", above, from_above)
+    if not np.allclose(turn, np.eye(3), atol=1e-12):
+        rotations = np.asarray(out.neutral_joint_rotations, np.float64).copy()
+        turned = turn @ places.turns[roots]
+        rotations[roots] = sk.euler_angles(Convention.of(out), turned)
+        out.neutral_joint_rotations = rotations
+
+
+def jaw_of(dna: Dna, mouth: Sequence[int]) -> int:
+    """The joint that the lower teeth hang on; -1: there is none.
+
+    It turns, carries some of the meshes in the mouth and not all of them.
+
+    Args:
+        dna: the face.
+        mouth: the meshes in the mouth.
+    """
+    count = len(dna.joint_names)
+    held = np.zeros(count)
+    for m in mouth:
+        _, joint, weight = sk.skin_entries(dna.meshes[m])
+        held += np.bincount(joint, weights=weight, minlength=count)
+    whole = held.sum()
+    for at in reversed(sk.parent_order(dna)):
+        if int(dna.joint_parents[at]) != at:
+            held[int(dna.joint_parents[at])] += held[at]
+    turned = np.zeros(count, bool)
+    for group in dna.joint_groups:
+        rows = np.asarray(group.output_indices, np.int64)
+        turned[rows[(rows % 9 >= 3) & (rows % 9 < 6)] // 9] = True
+    able = np.flatnonzero(turned & (held > _SOME * whole) & (held < (1 - _SOME) * whole))
+    return max(able.tolist(), key=lambda j: (held[j], -j), default=-1)
+
+
+def shifts_carried(dna: Dna, places: Places, turn: Doubles) -> list[JointGroup]:
+    """The joint groups with shifts as they are on the other head.
+
+    Args:
+        dna: the face before.
+        places: of its joints.
+        turn: float64[3, 3] of the whole head.
+    """
+    parents = np.asarray(dna.joint_parents, np.int64)
+    roots = parents == np.arange(len(parents))
+    old = np.where(roots[:, None, None], np.eye(3), places.turns[parents])
+    new = np.where(roots[:, None, None], np.eye(3), turn @ old)
+    return [_carried(group, old, new, places) for group in dna.joint_groups]
+
+
+def _carried(group: JointGroup, old: Doubles, new: Doubles, places: Places) -> JointGroup:
+    rows = np.asarray(group.output_indices, np.int64)
+    values = np.asarray(group.values, np.float64).copy()
+    shift = np.flatnonzero((rows % 9 < 3) & (rows // 9 < len(old)))
+    if not len(shift) or not values.size:
+        return group
+    for joint in np.unique(rows[shift] // 9).tolist():
+        own = shift[rows[shift] // 9 == joint]
+        axes = rows[own] % 9
+        mixing = new[joint].T @ places.linear[joint] @ old[joint]
+        values[own] = mixing[np.ix_(axes, axes)] @ values[own]
+    out = copy.copy(group)
+    out.values = values
+    return out

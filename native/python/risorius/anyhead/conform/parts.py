@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: MIT
+"""What of a face is stiff: eyes, which are spheres, and the inside of the mouth."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ... import Dna, Mesh
+from ...author.geometry import skeleton as sk
+from ...author.geometry.simplify import pieces_of
+from ...author.geometry.skeleton import Doubles, Ints
+from ...author.heads.islands import ball_of
+from ...web.kinds import kind_of
+from .change import Change, Similar, similar
+
+_ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
+_MOUTH = re.compile(r"saliva", re.IGNORECASE)
+_INNER = 0.35  # of an eye's radius: joints as near to its middle are the eye's
+_RIM, _BAND = 1.1, 0.03  # of the radius: where the rims of lids lie, and how far off they may
+_STIFF = 0.9  # of a vertex' weight that an eye's joints have, where it goes with the eye
+_PRIOR = 0.01  # how much the skin around counts beside the distance of the rims
+_ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class Eye:
+    """An eyeball.
+
+    Attributes:
+        middle: float64[3], and
+        radius: on the first head.
+        way: where it comes to.
+        joints: at its middle, as those of lids are that slide on it.
+        holds: joints that hold it.
+    """
+
+    middle: Doubles
+    radius: float
+    way: Similar
+    joints: frozenset[int]
+    holds: frozenset[int]
+
+
+class Ball(NamedTuple):
+    """An eyeball of the other head, in the face's axes, unit and place."""
+
+    middle: Doubles
+    radius: float
+
+
+class Stiff(NamedTuple):
+    """The skin's mesh, the eyes, and what the inside of the mouth does."""
+
+    skin: int
+    eyes: Sequence[Eye]
+    mouth: Similar | None
+
+
+def kind(name: str) -> str:
+    """eyes, mouth, or skin for what lies on the skin.
+
+    Args:
+        name: of a mesh.
+    """
+    found = kind_of(name)
+    if found in ("teeth", "tongue", "gum") and not _ON_SKIN.search(name):
+        return "mouth"
+    if found == "wet" and _MOUTH.search(name):
+        return "mouth"
+    return "eyes" if found == "eyes" else "skin"
+
+
+def skin_of(dna: Dna) -> int:
+    """The mesh of the finest level that is the skin; -1: there is none.
+
+    Args:
+        dna: the face.
+    """
+    return max(
+        (m for m in finest(dna) if kind_of(dna.mesh_names[m]) == "skin"),
+        key=lambda m: (len(dna.meshes[m].positions), -m),
+        default=-1,
+    )
+
+
+def finest(dna: Dna) -> list[int]:
+    """The meshes of LOD 0."""
+    rows, count = dna.lod_mesh_mapping, min(len(dna.meshes), len(dna.mesh_names))
+    listed = rows[0].tolist() if len(rows) else range(count)
+    return [m for m in listed if m < count and len(dna.meshes[m].positions)]
+
+
+def mouth_way(dna: Dna, change: Change) -> Similar | None:
+    """What teeth, gums and tongue do together; None: there are none.
+
+    Args:
+        dna: the face.
+        change: of its skin.
+    """
+    own = [
+        np.asarray(dna.meshes[m].positions, np.float64)
+        for m in finest(dna)
+        if kind(dna.mesh_names[m]) == "mouth"
+    ]
+    if not own:
+        return None
+    points = np.concatenate(own)
+    low, high = points.min(axis=0), points.max(axis=0)
+    return change.around((low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+
+
+def eyes_of(
+    dna: Dna,
+    change: Change,
+    moved: Mapping[str, Doubles],
+    world: Doubles,
+    balls: Sequence[Ball] = (),
+) -> list[Eye]:
+    """The eyeballs of a face.
+
+    Args:
+        dna: the face.
+        change: of its skin.
+        moved: float64[V, 3] by mesh, where vertices lie on the other head; an eye that is there
+            goes there.
+        world: float64[J, 3], where the joints are.
+        balls: eyes of the other head.
+    """
+    out: list[Eye] = []
+    for m in finest(dna):
+        name, mesh = dna.mesh_names[m], dna.meshes[m]
+        if kind(name) != "eyes":
+            continue
+        points = np.asarray(mesh.positions, np.float64)
+        for vertices in _balls(mesh, points):
+            ball = ball_of(points, vertices, off=0.3)
+            middle = points[vertices].mean(axis=0) if ball is None else ball.middle
+            far = np.linalg.norm(points[vertices] - middle, axis=1)
+            radius = float(np.median(far)) if ball is None else ball.radius
+            own = [e for e in out if np.linalg.norm(e.middle - middle) < max(e.radius, radius)]
+            if own:
+                continue  # its cornea, or what lies behind it
+            joints = np.flatnonzero(np.linalg.norm(world - middle, axis=1) < _INNER * radius)
+            if name in moved:
+                way = similar(points[vertices], moved[name][vertices], change)
+            else:
+                way = _in_ball(_in_lids(change, middle, radius), radius, balls)
+            holds = _holding(mesh, vertices, len(world))
+            out.append(Eye(middle, radius, way, frozenset(joints.tolist()), holds))
+    return out
+
+
+def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
+    """bool[V]: whether vertices go with an eye, as its joints hold them.
+
+    Args:
+        mesh: has the weights.
+        joints: of the eye.
+    """
+    vertex, joint, weight = sk.skin_entries(mesh)
+    own = weight * np.isin(joint, list(joints))
+    held = np.bincount(vertex, weights=own, minlength=len(mesh.positions))
+    return np.asarray(held > _STIFF)
+
+
+def _holding(mesh: Mesh, vertices: Ints, joints: int) -> frozenset[int]:
+    """The joints that hold most of some vertices."""
+    vertex, joint, weight = sk.skin_entries(mesh)
+    own = np.isin(vertex, vertices)
+    held = np.bincount(joint[own], weights=weight[own], minlength=joints)
+    return frozenset(np.flatnonzero(held > held.sum() / 2).tolist())
+
+
+def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
+    """The pieces of a mesh that lie at places of their own, largest first."""
+    label = pieces_of(mesh)
+    pieces = [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
+    return sorted(pieces, key=lambda own: -float(np.ptp(points[own], axis=0).max()))
+
+
+def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
+    """An eyeball where the other head has one, near the place that its lids say."""
+    near = [b for b in balls if np.linalg.norm(b.middle - way.becomes) < way.size * radius]
+    if not near:
+        return way
+    ball = min(near, key=lambda b: float(np.linalg.norm(b.middle - way.becomes)))
+    linear = ball.radius / (way.size * radius) * way.linear
+    return Similar(linear, way.middle, np.asarray(ball.middle, np.float64))
+
+
+def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
+    """An eyeball whose distance from the rims of the lids grows as it does.
+
+    Rims are a narrow band of a sphere: they say well where the eye is, and together with what the
+    skin around does how large it is.
+    """
+    start = change.around(middle, radius)
+    away = change.before.points - middle
+    far = np.linalg.norm(away, axis=1)
+    share = np.exp(-(((far / radius - _RIM) / _BAND) ** 2) / 2)
+    near = np.flatnonzero(share > 1e-3)
+    near = near[change.sees(change.before.points[near], away[near] / far[near, None], 3 * radius)]
+    if len(near) < 12:
+        return start
+    far, after = far[near], change.after.points[near]
+    share = share[near] / share[near].sum()
+    first = np.append(start.becomes, start.size)
+    prior = _PRIOR * np.diag([1.0, 1.0, 1.0, radius**2])
+    place = first.copy()
+    for _ in range(_ROUNDS):
+        to = after - place[:3]
+        length = np.maximum(np.linalg.norm(to, axis=1), 1e-12)
+        rows = np.column_stack([-to / length[:, None], -far])
+        off = rows.T @ (share * (length - place[3] * far)) + prior @ (place - first)
+        step = np.linalg.solve(rows.T @ (share[:, None] * rows) + prior, off)
+        place = place - step
+        if np.abs(step[:3]).max() < 1e-9 * radius:
+            break
+    if place[3] <= 0:
+        return start
+    return Similar(place[3] * change.turn, middle, place[:3])

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""A sculpt of a face's own topology: which meshes it has, and in which axes and unit."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ... import Dna, Mesh
+from ...author.geometry.rigid import rigid_fit
+from ...author.geometry.skeleton import Doubles
+from ...author.heads.parts import HeadPart
+from ...author.heads.sizes import UNITS
+from ...author.input.obj import ObjMesh
+from .parts import finest, skin_of
+
+_AS_IT_IS = 2.0  # times larger or smaller: a form, and no other unit
+_LEANS = np.cos(np.radians(30.0))  # of the angle by which a head may lean in its file
+_FIVE = 5  # polygons of more corners are seldom, and cut in many ways
+
+
+def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
+    """float64[V, 3] of each mesh of the finest level that a head has with the same polygons.
+
+    Polygons may be cut into triangles. Of several meshes with the same polygons, as both eyes are,
+    the one of the nearest name is meant, then the first.
+
+    Args:
+        dna: the face.
+        parts: the meshes of the head.
+    """
+    out: dict[str, Doubles] = {}
+    left = list(parts)
+    for m in sorted(finest(dna), key=lambda m: m != skin_of(dna)):
+        name, mesh = dna.mesh_names[m], dna.meshes[m]
+        alike = [part for part in left if has_polygons_of(mesh, part.mesh)]
+        if alike:
+            part = max(alike, key=lambda p: (_same_start(p.name, name), -left.index(p)))
+            left.remove(part)
+            out[name] = np.asarray(part.mesh.positions, np.float64)
+    return out
+
+
+def has_polygons_of(mesh: Mesh, other: ObjMesh) -> bool:
+    """Whether a mesh has the vertices and polygons of a mesh of a face.
+
+    Args:
+        mesh: of the face.
+        other: the mesh in question.
+    """
+    if len(other.positions) != len(mesh.positions) or not other.faces:
+        return False
+    corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts, np.int64)]
+    offsets = np.asarray(mesh.face_offsets, np.int64).tolist()
+    known = set()
+    for begin, end in itertools.pairwise(offsets):
+        own = sorted(set(corners[begin:end].tolist()))
+        known.add(tuple(own))
+        if 3 < len(own) <= _FIVE:
+            known.update(itertools.combinations(own, 3))
+    found = [tuple(sorted(set(face))) in known for face in other.faces]
+    longer = [len(face) > _FIVE for face in other.faces]
+    return all(f or more for f, more in zip(found, longer, strict=True)) and any(found)
+
+
+def into_own_space(
+    dna: Dna, moved: dict[str, Doubles], factor: float | None = None
+) -> tuple[dict[str, Doubles], str]:
+    """The vertices of a sculpt in the face's axes and unit, and a sentence where they had others.
+
+    A sculpt that lies as the face does stays where it is. Otherwise it is turned by right angles
+    and multiplied by the ratio of two units.
+
+    Args:
+        dna: the face.
+        moved: float64[V, 3] by mesh, of a head; with the skin.
+        factor: what all numbers are multiplied with; None: it is found.
+    """
+    skin = skin_of(dna)
+    before = np.asarray(dna.meshes[skin].positions, np.float64)
+    after = moved[dna.mesh_names[skin]]
+    turn, _ = rigid_fit(before, after)
+    a, b = before - before.mean(axis=0), after - after.mean(axis=0)
+    size = float((b * (a @ turn.T)).sum()) / max(float((a**2).sum()), 1e-300)
+    own = turn_back(turn)
+    if factor is None:
+        factor = 1.0 if 1 / _AS_IT_IS < size < _AS_IT_IS else unit_back(size)
+    if factor == 1.0 and np.array_equal(own, np.eye(3)):
+        return moved, ""
+    there = {name: factor * points @ own.T for name, points in moved.items()}
+    return there, f"the head is turned into the face's axes and multiplied by {factor:g}"
+
+
+def turn_back(turn: Doubles) -> Doubles:
+    """float64[3, 3]: what turns a head back, by right angles where it then leans a little at most.
+
+    Args:
+        turn: float64[3, 3], from the face to the head.
+    """
+    best = max(right_angles(), key=lambda own: float(np.trace(own @ turn)))
+    leans = (np.trace(best @ turn) - 1) / 2
+    return best if leans > _LEANS else turn.T
+
+
+def right_angles() -> list[Doubles]:
+    """The 24 rotations that bring axes to axes, none first."""
+    out = []
+    for order in itertools.permutations(range(3)):
+        for signs in itertools.product((1.0, -1.0), repeat=3):
+            turn = np.array(signs)[:, None] * np.eye(3)[list(order)]
+            if np.linalg.det(turn) > 0:
+                out.append(turn)
+    return out
+
+
+def unit_back(size: float) -> float:
+    """The ratio of two units that makes a head about as large as the face.
+
+    Args:
+        size: how large the head is beside the face, above 0.
+    """
+    ratios = {one / other for one in UNITS.values() for other in UNITS.values()}
+    return min(sorted(ratios), key=lambda ratio: abs(np.log(ratio * max(size, 1e-12))))
+
+
+def _same_start(one: str, other: str) -> int:
+    """How many characters two names have in common from their beginning."""
+    pairs = zip(one.lower(), other.lower(), strict=False)
+    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))

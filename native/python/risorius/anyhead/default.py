@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: MIT
+"""The template where none is named: the sample person, built once and kept among the caches."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+from .. import Dna, DnaError, load
+from ..base.version import __version__
+from ..files import fileio
+from ..files.caches import cache_folder
+from ..people import NoPeopleError, people
+from .errors import AnyHeadError
+
+_TEXELS = 64  # the pictures are not kept
+
+
+def default_template() -> Dna:
+    """The sample person as a face of blend shapes; built in half a minute when first asked for.
+
+    Raises:
+        AnyHeadError: the person's data are not on this machine; says how to get them.
+        OSError: the cache cannot be written.
+    """
+    try:
+        package = people()
+    except NoPeopleError as missing:
+        raise AnyHeadError(f"name a DNA file as template: {missing}") from None
+    path = cache_folder() / f"template-{__version__}-{_digest(package)}.dna"
+    if path.is_file():
+        try:
+            return load(path)
+        except DnaError:
+            path.unlink()  # cut off by a full disk: it is made anew
+    if not package.is_fetched():
+        raise AnyHeadError(
+            "a template was expected: name a DNA file with expressions, or build the sample person "
+            "once with `risorius sample man.dna`, whose data are then the template's as well"
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        dna = package.build_sample(
+            Path(folder) / "template.dna", rig=None, offline=True, texture_size=_TEXELS, say=_quiet
+        )
+    assert isinstance(dna, Dna)
+    fileio.write_bytes(path, dna.to_bytes())
+    return dna
+
+
+def _quiet(_line: str) -> None:
+    pass
+
+
+def _digest(package: ModuleType) -> str:
+    """Of the code that makes the person: another version makes another template."""
+    out = hashlib.sha256()
+    folder = Path(package.__path__[0])
+    for path in sorted(folder.rglob("*")):
+        if path.suffix in (".py", ".toml"):
+            out.update(path.read_bytes())
+    return out.hexdigest()[:16]

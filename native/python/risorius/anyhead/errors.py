@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: MIT
+"""Errors of putting a rig onto a head without expressions."""
+
+from __future__ import annotations
+
+from ..base.errors import RisoriusError
+
+
+class AnyHeadError(RisoriusError):
+    """A head or a template that cannot be used."""
+
+    code = "any_head"
+
+
+class Stopped(RisoriusError):  # noqa: N818  # nothing went wrong
+    """Whoever was told of the progress wants no more of it."""
+
+    code = "cancelled"
+
+    def __init__(self) -> None:
+        super().__init__("stopped")

@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: MIT
+"""Lids that close on this eye without a gap, and stay out of it in every expression.
+
+A lid moves by a turn about the axis through the eye's middle along both corners. What was
+transferred is kept, but scaled so that the edges meet; what goes into the eye is lifted out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..._native import ClosestPoints
+from ...author.geometry.skeleton import Doubles, Ints
+from ...base.easing import smooth_step
+from ..surface import Surface
+from .eyeballs import Eyeball
+from .opening import FAR, Opening, find_opening, gap_rays, near_eye, visible_gap
+
+_RADIUS_MM = 12.0  # of a human eye: lengths below are meant on it
+_BAND = 3.0  # mm from the edge: what goes all of the way
+_FADE = 16.0  # mm from the edge: what goes none of it
+_CORNER = 4.0  # mm beyond a corner: what goes none of it
+_CLEAR = 0.3  # mm above the eye at rest: what is outside of it, no rim that touches
+_SKIN = 0.5  # mm above the eye, least of what was further from it
+_PRESSED = 0.1  # mm that edges overlap which are brought together
+_OVER = 0.4  # mm that an edge goes further than its own column asks for
+_BESIDE = 0.5  # mm beyond the edges, where the eye is seen between lids still
+_THROUGH = 0.8  # mm that the edges of closed lids may overlap
+_LOWER = 0.15  # of the gap: what the lower lid takes
+_ROUNDS = 8
+_ENOUGH = 0.1  # mm of an eye that is seen between closed lids
+_SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # shares of columns
+_HELD = 1.5  # of the radius: what is further from the eye's middle goes less far
+_LOOKS = 64  # directions each way that are looked along
+_LIFTS = 4
+_SCALES = (0.6, 2.5)  # of the transferred turn
+_SPREAD = 6  # rounds in which a lift goes to what is beside it
+_MOVED = 0.1  # mm: what moves less rests
+_WIDE = np.radians(75.0)  # from the front: what is further aside is no lid
+
+
+class Eyelids:
+    """The lids of one eye of a target at rest.
+
+    Attributes:
+        ball: the eye.
+        opening: where it is seen.
+        upper, lower: int64[n], vertices of each lid.
+    """
+
+    def __init__(self, skin: Surface, ball: Eyeball, opening: Opening) -> None:
+        """Begins.
+
+        Args:
+            skin: the target at rest.
+            ball: the eye.
+            opening: of the same skin.
+        """
+        self.ball, self.opening = ball, opening
+        self.mm = ball.radius / _RADIUS_MM  # what a millimetre of a human eye is here
+        lids = near_eye(skin, ball)
+        near, triangles = np.unique(lids.triangles, return_inverse=True)
+        self._around = skin.points[near]  # lids, and the corners of triangles that end in them
+        self._triangles: Ints = triangles.reshape(-1, 3)
+        across, up, away = opening.frame.angles(skin.points[near])
+        lid = (away < FAR * ball.radius) & (np.abs(up) < _WIDE) & (away > 0.8 * ball.radius)
+        self.vertices = near[lid]
+        self._lid = np.flatnonzero(lid)
+        self.rest = skin.points[self.vertices]
+        across, up, away = across[lid], up[lid], away[lid]
+        self._above = up > opening.line(across)
+        self.upper, self.lower = self.vertices[self._above], self.vertices[~self._above]
+        self._height = away - ball.reach(opening.frame.rays(across, up))
+        self._outside = self._height > _CLEAR * self.mm
+        edge = np.where(self._above, opening.line(across, 1.0), opening.line(across, 0.0))
+        off = np.where(self._above, up - edge, edge - up)
+        self._from_edge = np.maximum(off, 0.0) * ball.radius * np.cos(across) / self.mm
+        beyond = np.maximum(opening.across[0] - across, across - opening.across[-1])
+        aside = smooth_step(np.maximum(beyond, 0) * ball.radius / self.mm / _CORNER)
+        far = smooth_step((away / ball.radius - _HELD) / (FAR - 0.05 - _HELD))
+        high = smooth_step(np.abs(up) / _WIDE * 3 - 2)
+        self._held = (1 - aside) * (1 - far) * (1 - high)
+        self._number()
+        margin = np.radians(25.0)
+        grid = np.meshgrid(
+            np.linspace(opening.across[0] - margin / 3, opening.across[-1] + margin / 3, _LOOKS),
+            np.linspace(opening.low.min() - margin, opening.high.max() + margin, _LOOKS),
+            indexing="ij",
+        )
+        self._looks = opening.frame.rays(*grid).reshape(-1, 3)
+        ball.keep(self._looks)
+        self._through = gap_rays(opening)
+        ball.keep(self._through)
+
+    def _number(self) -> None:
+        """Edges and triangles of the lids by their own numbers."""
+        place = np.full(len(self._around), -1)
+        place[self._lid] = np.arange(len(self._lid))
+        self._own = place[self._triangles]  # -1: no lid
+        whole: Ints = self._own[(self._own >= 0).all(axis=1)]
+        sides = np.sort(whole[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        self._edges: Ints = np.unique(sides, axis=0)
+
+    def _posed(self, points: Doubles) -> ClosestPoints:
+        """The skin near the eye with lids at other places."""
+        posed = self._around.copy()
+        posed[self._lid] = points
+        return ClosestPoints(posed, np.ascontiguousarray(self._triangles, np.int32))
+
+    def rim(self, reach: float) -> tuple[Ints, Doubles]:
+        """Vertices of both edges that lie on the eye at rest, and float64[n] how high above it.
+
+        Args:
+            reach: mm of a human eye from the edges.
+        """
+        own = (self._from_edge < reach) & (np.abs(self._height) < 0.08 * self.ball.radius)
+        own &= self._held > 0
+        return self.vertices[own], self._height[own]
+
+    def moves(self, displacement: Doubles) -> bool:
+        """Whether an expression moves these lids.
+
+        Args:
+            displacement: float64[V, 3], of the whole target.
+        """
+        near = self.vertices[self._from_edge < _FADE / 2]
+        far = np.linalg.norm(displacement[near], axis=1).max(initial=0.0)
+        return bool(far > _MOVED * self.mm)
+
+    def gap(self, displacement: Doubles, turn: Doubles | None = None) -> float:
+        """The widest place at which the eye is seen, in the target's unit.
+
+        Args:
+            displacement: float64[V, 3], of the whole target.
+            turn: float64[3, 3], what the eye is turned by; None: it rests.
+        """
+        return self._gap(self.rest + displacement[self.vertices], turn)
+
+    def cut(self, displacement: Doubles, turn: Doubles | None = None) -> float:
+        """How deep the outside of the lids lies in the eye, in the target's unit.
+
+        Args:
+            displacement: float64[V, 3], of the whole target.
+            turn: float64[3, 3], what the eye is turned by; None: it rests.
+        """
+        points = self.rest + displacement[self.vertices]
+        return float(self._lacks(points, turn, 0.0).max(initial=0.0))
+
+    def closed(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
+        """float64[V, 3]: a blink whose edges meet on the eye.
+
+        Args:
+            displacement: float64[V, 3], of the whole target.
+            turn: float64[3, 3], what the eye is turned by; None: it rests.
+        """
+        frame = self.opening.frame
+        rest_up = frame.angles(self.rest)[1]
+        points = self.rest + displacement[self.vertices]
+        best, least = points, np.inf
+        for number in range(_ROUNDS):
+            across, up, away = frame.angles(points)
+            apart = self._apart(points, turn)
+            if not apart.any():
+                break
+            fade = self._fade(float(np.abs(apart).max()))
+            down = np.interp(across, self.opening.across, apart)
+            if number == 0:
+                lowered = self._scaled(across, up - rest_up, points, turn, (1 - _LOWER) * apart)
+            else:
+                lowered = (1 - _LOWER) * down * fade
+            new = up + np.where(self._above, -lowered, _LOWER * down * fade)
+            points = frame.middle + away[:, None] * frame.rays(across, new)
+            points = self._lifted(points, turn)
+            wrong = self._gap(points, turn)
+            if wrong < least:
+                best, least = points, wrong
+            if number and wrong < _ENOUGH * self.mm:
+                break
+        out = displacement.copy()
+        out[self.vertices] = best - self.rest
+        return out
+
+    def lifted(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
+        """float64[V, 3]: an expression whose lids are not in the eye.
+
+        Args:
+            displacement: float64[V, 3], of the whole target.
+            turn: float64[3, 3], what the eye is turned by; None: it rests.
+        """
+        points = self._lifted(self.rest + displacement[self.vertices], turn)
+        out = displacement.copy()
+        out[self.vertices] = points - self.rest
+        return out
+
+    def _gap(self, points: Doubles, turn: Doubles | None) -> float:
+        return float(self._seen(points, turn).max(initial=0.0))
+
+    def _seen(self, points: Doubles, turn: Doubles | None) -> Doubles:
+        """float64[columns]: how much of the eye is seen between the edges, in the target's unit."""
+        low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
+        beside = _BESIDE * self.mm / self.ball.radius
+        edges = np.minimum(low, high) - beside, np.maximum(low, high) + beside
+        return visible_gap(self._posed(points), self.ball, self.opening, self._through, edges, turn)
+
+    def _apart(self, points: Doubles, turn: Doubles | None) -> Doubles:
+        """float64[columns]: what edges are to come together by, radians; below 0 where the upper
+        lid goes through the lower one, further than closed lids press on each other."""
+        low, high = self._edge(points, turn, upper=False), self._edge(points, turn)
+        unit = self.mm / self.ball.radius
+        apart = high - low
+        known = ~np.isnan(apart)
+        if not known.any():
+            return np.zeros(len(apart))
+        columns = np.arange(len(apart))
+        apart = np.interp(columns, columns[known], apart[known])
+        # What is hidden in the eye overlaps a little where the eye is seen.
+        seen = self._seen(points, turn) / self.ball.radius
+        lacks = np.where(seen > 0, np.maximum(apart, seen) + _PRESSED * unit, 0.0)
+        through = np.minimum(apart + _THROUGH * unit, 0.0)
+        most = self.opening.high - self.opening.low  # a corner is no place to go far
+        even = np.minimum(_even(lacks), np.maximum(apart, 0.0) + _OVER * unit)
+        return np.clip(even + _even(through), -most, most)
+
+    def _fade(self, most: float) -> Doubles:
+        """float64[n]: how much of a turn each vertex takes; most: radians an edge is turned by."""
+        reach = max(_FADE, 2.5 * most * self.ball.radius / self.mm)
+        along = (self._from_edge - _BAND) / (reach - _BAND)
+        return np.asarray((1 - smooth_step(along)) * self._held)
+
+    def _scaled(
+        self,
+        across: Doubles,
+        turned: Doubles,
+        points: Doubles,
+        turn: Doubles | None,
+        wanted: Doubles,
+    ) -> Doubles:
+        """float64[n], radians: what the upper lid goes down by, so that its edge goes down by
+        `wanted`: as a share of its own turn, and the rest by _fade."""
+        columns = self.opening.across
+        high = self._edge(points, turn)
+        own = np.nan_to_num(self.opening.high - high)  # of the edge, downwards
+        least = np.radians(2.0)
+        scale = np.where(own > least, 1 + wanted / np.maximum(own, least), 1.0)
+        scale = np.clip(scale, *_SCALES)
+        rest = wanted - (scale - 1) * np.where(own > least, own, 0.0)
+        whole = (np.interp(across, columns, scale) - 1) * self._held
+        fade = self._fade(float(np.abs(rest).max()))
+        return np.asarray(-turned * whole + np.interp(across, columns, rest) * fade)
+
+    def _edge(self, points: Doubles, turn: Doubles | None, *, upper: bool = True) -> Doubles:
+        """float64[columns]: the lowest place of the upper lid or the highest of the lower one,
+        where the lid is over the eye; NaN where it has none."""
+        across, up, away = self.opening.frame.angles(points)
+        own = self._above == upper
+        a, b = self._edges[own[self._edges].all(axis=1)].T
+        near = (self._from_edge[a] < 2 * _BAND) | (self._from_edge[b] < 2 * _BAND)
+        a, b = a[near], b[near]
+        columns = self.opening.across
+        out = np.full(len(columns), np.nan)
+        clear = away - self.ball.reach(self.opening.frame.rays(across, up), turn)
+        for k, column in enumerate(columns):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = (column - across[a]) / (across[b] - across[a])
+            on = (share >= 0) & (share <= 1)
+            s = share[on]
+            over = (1 - s) * clear[a[on]] + s * clear[b[on]] > -0.02 * self.mm
+            places = ((1 - s) * up[a[on]] + s * up[b[on]])[over]
+            if len(places):
+                out[k] = places.min() if upper else places.max()
+        return out
+
+    def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
+        """float64[n]: how far the eye comes through the skin that is clear of it at rest, or lies
+        less than `above` below it, at the corners of the triangles that it comes through."""
+        frame, ball, lacks = self.opening.frame, self.ball, np.zeros(len(points))
+        tree = self._posed(points)
+        rays = self._looks
+        begin = FAR * ball.radius
+        triangle, _, distance = tree.first_hit(frame.middle + begin * rays, -rays)
+        triangle, height = np.asarray(triangle), begin - np.asarray(distance)
+        corners = self._own[np.maximum(triangle, 0)]
+        clear = (corners >= 0).all(axis=1)
+        clear[clear] = self._outside[corners[clear]].all(axis=1)
+        hit = (triangle >= 0) & clear & (height > 0.7 * ball.radius)
+        lack = ball.reach(rays, turn)[hit] + above - height[hit]
+        for k in range(3):
+            np.maximum.at(lacks, corners[hit, k], lack)
+        return lacks
+
+    def _lifted(self, points: Doubles, turn: Doubles | None) -> Doubles:
+        """Points on their rays from the eye's middle, outside of the eye."""
+        arm = points - self.opening.frame.middle
+        length = np.linalg.norm(arm, axis=1)
+        ray = arm / np.maximum(length, 1e-12)[:, None]
+        # The rim keeps the height that it has at rest.
+        moved = np.linalg.norm(points - self.rest, axis=1) > _MOVED * self.mm
+        rim = (self._from_edge < _BAND) & (moved | (turn is not None))
+        need = np.maximum(self.ball.reach(ray, turn) + np.minimum(self._height, _SKIN * self.mm)
+                          - length, 0.0)  # fmt: skip
+        need = np.where(rim, need, 0.0)
+        lift = self._spread(need)
+        for _ in range(_LIFTS):
+            lacks = self._lacks(points + lift[:, None] * ray, turn, 0.5 * _CLEAR * self.mm)
+            if not lacks.any():
+                break
+            need = lift + lacks
+            lift = self._spread(need)
+        return np.asarray(points + lift[:, None] * ray)
+
+    def _spread(self, need: Doubles) -> Doubles:
+        """What is needed, and softly less around."""
+        lift = need.copy()
+        a, b = self._edges.T
+        count = np.bincount(a, minlength=len(lift)) + np.bincount(b, minlength=len(lift))
+        for _ in range(_SPREAD):
+            total = np.bincount(a, lift[b], len(lift)) + np.bincount(b, lift[a], len(lift))
+            lift = np.maximum(need, total / np.maximum(count, 1))
+        return lift
+
+
+def _even(values: Doubles) -> Doubles:
+    """Columns as their neighbours have them: edges of coarse lids have no notches."""
+    wide = np.pad(values, len(_SOFT) // 2, mode="edge")
+    return np.convolve(wide, _SOFT / _SOFT.sum(), mode="valid")
+
+
+def find_eyelids(skin: Surface, ball: Eyeball) -> Eyelids | None:
+    """The lids of an eye; None where skin covers it, or where there are none.
+
+    Args:
+        skin: the target at rest.
+        ball: the eye.
+    """
+    opening = find_opening(near_eye(skin, ball), ball)
+    return Eyelids(skin, ball, opening) if opening is not None else None

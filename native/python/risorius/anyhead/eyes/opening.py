@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: MIT
+"""The opening between the lids of an eye, found by rays from the eye's middle.
+
+A ray that meets no lid leaves through the opening. So upper and lower lid are known on a mesh of
+any topology, without names and without a template.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..._native import ClosestPoints
+from ...author.geometry.skeleton import Doubles, Ints
+from ..surface import Surface
+from .eyeballs import Eyeball
+
+Mask = npt.NDArray[np.bool_]
+FAR = 1.9  # of the radius: what is further from the eye's middle is no lid
+COLUMNS = 48
+_WIDE, _HIGH = 72.0, 60.0  # degrees from the front in which the opening is sought
+_STEP = 2.0  # degrees of the first look
+_FINE = 0.5  # degrees of the second look, whose edges are then halved
+_HALVINGS = 6
+_ABOVE = 1.001  # of the eye's surface: where rays begin
+_LEAST = 6  # directions of the first look that an opening has at least
+_SURE = 12  # directions that it has where ways out of it were cut but once
+_CUTS = 4
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Directions about an eye's middle: across (to the character's left), up and front.
+
+    A turn about `across` changes the second angle and keeps the first, as lids move.
+    """
+
+    middle: Doubles
+    across: Doubles
+    up: Doubles
+    front: Doubles
+
+    def angles(self, points: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+        """Angle across and angle up, radians, and the distance from the middle, float64[n] each.
+
+        Args:
+            points: float64[n, 3].
+        """
+        arm = points - self.middle
+        length = np.linalg.norm(arm, axis=1)
+        ray = arm / np.maximum(length, 1e-12)[:, None]
+        across = np.arcsin(np.clip(ray @ self.across, -1.0, 1.0))
+        return across, np.arctan2(ray @ self.up, ray @ self.front), length
+
+    def rays(self, across: Doubles, up: Doubles) -> Doubles:
+        """float64[..., 3] of length 1.
+
+        Args:
+            across: float64[...], radians.
+            up: float64[...], radians.
+        """
+        c = np.cos(across)[..., None]
+        return np.asarray(
+            np.sin(across)[..., None] * self.across
+            + c * (np.sin(up)[..., None] * self.up + np.cos(up)[..., None] * self.front)
+        )
+
+
+@dataclass(frozen=True)
+class Opening:
+    """Where an eye is seen at rest.
+
+    Attributes:
+        frame: its first axis goes through both corners.
+        across: float64[COLUMNS], radians, from corner to corner, ascending.
+        low, high: float64[COLUMNS], radians, the edges of the lower and the upper lid.
+    """
+
+    frame: Frame
+    across: Doubles
+    low: Doubles
+    high: Doubles
+
+    def line(self, across: Doubles, share: float = 0.5) -> Doubles:
+        """float64[n]: a height between both edges.
+
+        Args:
+            across: float64[n], radians.
+            share: 0: the lower edge, 1: the upper one.
+        """
+        return np.interp(across, self.across, self.low + share * (self.high - self.low))
+
+
+def near_eye(surface: Surface, ball: Eyeball) -> Surface:
+    """The triangles that may be lids, with the numbers of vertices that the surface has.
+
+    Args:
+        surface: of the skin.
+        ball: the eye.
+    """
+    near = np.linalg.norm(surface.points - ball.middle, axis=1) < FAR * ball.radius
+    return Surface(surface.points, surface.triangles[near[surface.triangles].any(axis=1)])
+
+
+def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:
+    """The opening of an eye; None where skin covers the eye or where there are no lids.
+
+    Args:
+        lids: the skin near the eye, see near_eye.
+        ball: the eye.
+    """
+    if not len(lids.triangles):
+        return None
+    used, triangles = np.unique(lids.triangles, return_inverse=True)
+    tree = ClosestPoints(lids.points[used], triangles.reshape(-1, 3).astype(np.int32))
+    x, y, z = np.eye(3)
+    frame = Frame(ball.middle, x, y, z)
+    across = np.radians(np.arange(-_WIDE, _WIDE + 1e-9, _STEP))
+    up = np.radians(np.arange(-_HIGH, _HIGH + 1e-9, _STEP))
+    blob = None
+    for _ in range(3):  # at last about the axis through both corners
+        frame = frame if blob is None else _turned(frame, across, up, blob)
+        seen = _seen(tree, ball, frame.rays(*np.meshgrid(across, up, indexing="ij")))
+        blob = _between_lids(seen)
+        if blob is None:
+            return None
+    assert blob is not None
+    columns = np.flatnonzero(blob.any(axis=1))
+    bounds = [(up[blob[c]].min(), up[blob[c]].max()) for c in columns]
+    return _refined(tree, ball, frame, across[columns], np.array(bounds))
+
+
+def _seen(tree: ClosestPoints, ball: Eyeball, rays: Doubles, turn: Doubles | None = None) -> Mask:
+    """bool[...]: whether a ray from the middle leaves between the lids."""
+    flat = rays if rays.ndim == 2 else rays.reshape(-1, 3)
+    # From the eye's surface: a socket behind it, and the part of a rim within it, hide nothing.
+    begin = ball.middle + (_ABOVE * ball.reach(flat, turn))[:, None] * flat
+    triangle, _, _ = tree.first_hit(begin, flat, farthest=(FAR - 1.0) * ball.radius)
+    return np.asarray(triangle).reshape(rays.shape[:-1]) < 0
+
+
+def _between_lids(seen: Mask) -> Mask | None:
+    """The largest region of directions that does not reach the border of the look: what does lies
+    beside the lids. Ways that leak out of it, through holes of a scan, are cut first."""
+    core = seen
+    for cuts in range(_CUTS):
+        core = core & _beside(core, np.minimum.reduce)
+        place = _regions(core)
+        labels, counts = np.unique(place[core], return_counts=True)
+        border = np.concatenate([place[[0, -1]].ravel(), place[:, [0, -1]].ravel()])
+        counts = np.where(np.isin(labels, border), 0, counts)
+        if not len(labels):
+            return None
+        if counts.max() >= (_LEAST if cuts else _SURE):
+            blob: Mask = place == labels[counts.argmax()]
+            for _ in range(cuts + 1):
+                blob = seen & _beside(blob, np.maximum.reduce)
+            return blob
+    return None
+
+
+def _regions(core: Mask) -> Ints:
+    """int64 as `core`: a number for each region that hangs together, 0 outside."""
+    place = np.where(core, np.arange(1, core.size + 1).reshape(core.shape), 0)
+    while True:
+        spread = np.where(core, _beside(place, np.maximum.reduce), 0)
+        if (spread == place).all():
+            return np.asarray(place, np.int64)
+        place = spread
+
+
+def _beside(values: npt.NDArray[Any], of: Callable[..., Any]) -> npt.NDArray[Any]:
+    """Of each place and the four beside it the least or the most."""
+    padded = np.pad(values, 1, mode="edge")
+    return np.asarray(
+        of([padded[1:-1, 1:-1], padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:],
+            padded[1:-1, :-2]])
+    )  # fmt: skip
+
+
+def _turned(frame: Frame, across: Doubles, up: Doubles, blob: Mask) -> Frame:
+    """A frame whose first axis goes through the corners, whose front is the opening's middle."""
+    columns = np.flatnonzero(blob.any(axis=1))
+    heights = np.array([up[blob[c]].mean() for c in columns])
+    ends = frame.rays(across[columns[[0, -1]]], heights[[0, -1]])
+    axis = ends[1] - ends[0]
+    axis /= np.linalg.norm(axis)
+    front = ends.mean(axis=0)
+    front -= (front @ axis) * axis
+    front /= np.linalg.norm(front)
+    return Frame(frame.middle, axis, np.cross(front, axis), front)
+
+
+def _refined(
+    tree: ClosestPoints, ball: Eyeball, frame: Frame, columns: Doubles, bounds: Doubles
+) -> Opening | None:
+    """Edges by column, each halved until it is known to a hundredth of a degree.
+
+    columns and bounds: of the first look, the lowest and the highest direction of each.
+    """
+    step = np.radians(_STEP)
+    ends = columns[[0, -1]] + [-step / 2, step / 2]
+    across = np.linspace(ends[0], ends[1], COLUMNS + 2)[1:-1]
+    low, high = (np.interp(across, columns, bounds[:, k]) for k in (0, 1))
+    up = np.radians(np.arange(-_HIGH, _HIGH + 1e-9, _FINE))
+    seen = _seen(tree, ball, frame.rays(*np.meshgrid(across, up, indexing="ij")))
+    seen &= (up > low[:, None] - 1.5 * step) & (up < high[:, None] + 1.5 * step)
+    kept = seen.any(axis=1)
+    if not kept.any():
+        return None
+    across, seen = across[kept], seen[kept]
+    first = seen.argmax(axis=1)
+    last = seen.shape[1] - 1 - seen[:, ::-1].argmax(axis=1)
+    fine = np.radians(_FINE)
+    edges = []
+    for open_at, way in ((up[first], -fine), (up[last], fine)):
+        inside, outside = open_at, open_at + way
+        for _ in range(_HALVINGS):
+            middle = (inside + outside) / 2
+            free = _seen(tree, ball, frame.rays(across, middle))
+            inside, outside = np.where(free, middle, inside), np.where(free, outside, middle)
+        edges.append((inside + outside) / 2)
+    return Opening(frame, across, edges[0], edges[1])
+
+
+_MARGIN = np.radians(4.0)  # beyond the opening
+_HEIGHTS = 240
+
+
+def gap_rays(opening: Opening) -> Doubles:
+    """float64[columns * heights, 3]: directions for visible_gap.
+
+    Args:
+        opening: at rest.
+    """
+    return opening.frame.rays(*_grid(opening)).reshape(-1, 3)
+
+
+def visible_gap(
+    lids: ClosestPoints,
+    ball: Eyeball,
+    opening: Opening,
+    rays: Doubles,
+    edges: tuple[Doubles, Doubles],
+    turn: Doubles | None = None,
+) -> Doubles:
+    """float64[columns]: how much of the eye is seen in each column, in the surface's unit.
+
+    Args:
+        lids: the skin near the eye in some pose.
+        ball: the eye.
+        opening: at rest, of the same skin.
+        rays: what gap_rays gives of it.
+        edges: float64[columns] each, radians: between which the lids' edges lie in this pose; NaN
+            where it is not known. What is seen beyond them is a hole of the skin.
+        turn: float64[3, 3], what the eye is turned by; None: it rests.
+    """
+    up = _grid(opening)[1]
+    seen = _seen(lids, ball, rays, turn).reshape(up.shape)
+    low = np.fmax(edges[0], opening.low - _MARGIN)[:, None]
+    high = np.fmin(edges[1], opening.high + _MARGIN)[:, None]
+    seen &= (up > low) & (up < high)
+    step = (up[0, 1] - up[0, 0]) * ball.radius
+    return np.asarray(seen.sum(axis=1) * step * np.cos(opening.across))
+
+
+def _grid(opening: Opening) -> list[Doubles]:
+    low, high = opening.low.min() - _MARGIN, opening.high.max() + _MARGIN
+    return np.meshgrid(opening.across, np.linspace(low, high, _HEIGHTS), indexing="ij")

@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: MIT
+"""Eyes, teeth, tongue, lashes and brows of any head: its own, or fitted in from a template."""
+
+from .completing import complete, head_parts
+from .fitted import Bodies, Fitted, Fittings
+from .sorting import sort_parts
+
+__all__ = ["Bodies", "Fitted", "Fittings", "complete", "head_parts", "sort_parts"]

@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+"""What a head lacks, fitted in from a template: eyeballs, teeth, gums, tongue and lashes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ... import Dna
+from ..._native import ClosestPoints
+from ...author.geometry.skeleton import Doubles
+from ...author.heads.islands import islands_of
+from ...author.heads.parts import HeadPart
+from ...author.input.obj import ObjMesh
+from ...base.errors import ArgumentError
+from ..eyes.eyeballs import Eyeball
+from ..eyes.eyelids import Eyelids, find_eyelids
+from ..eyes.opening import Opening, find_opening, near_eye
+from ..surface import Surface
+from .fitted import BROWS, EYE, GUMS, LASHES, SKIN, TEETH, TONGUE, Fitted, Fittings
+from .following import Followers
+from .similarity import Similarity, similarity
+from .sorting import sort_parts
+from .template_parts import template_parts
+
+Mask = npt.NDArray[np.bool_]
+_RIM = 1.5  # mm from the edge of a lid: what lies on the eye
+_PATCH = 40  # vertices of the skin that lashes are laid on by
+_SEEN = 0.3  # of the template's opening: where less is seen the eye is painted or closed
+_AROUND = 2.5  # cm around the teeth: the skin that says where they belong
+_STEP, _STEPS = 0.05, 16  # cm that teeth go back by where they come through the skin
+_THROUGH = 0.02  # cm that they may
+_SIDES = {"L": "left", "R": "right"}
+
+
+def complete(found: Fittings, template: Dna, laid: Doubles) -> Fittings:
+    """A head with what it lacks from a template.
+
+    Args:
+        found: what the head has.
+        template: a face of a DNA file.
+        laid: float64[V, 3], where the vertices of the template's skin lie on the head.
+
+    Raises:
+        ArgumentError: as many vertices as the template's skin has were expected.
+    """
+    number, parts = template_parts(template)
+    skin = parts[number].mesh
+    if len(laid) != len(skin.positions):
+        raise ArgumentError(
+            f"{len(skin.positions):,} vertices of the template's skin were expected, found "
+            f"{len(laid):,}"
+        )
+    return _Completing(found, sort_parts(parts), skin, laid).made()
+
+
+class _Completing:
+    def __init__(self, found: Fittings, like: Fittings, skin: ObjMesh, laid: Doubles) -> None:
+        self.found, self.like, self.laid = found, like, laid
+        self.skin = Surface.of_polygons(skin.positions, skin.faces)
+        self.target = Surface.of_polygons(found.face.mesh.positions, found.face.mesh.faces)
+        self.out = replace(
+            found, rows=list(found.rows), eyes=dict(found.eyes), notes=list(found.notes)
+        )
+
+    def made(self) -> Fittings:
+        fitted = [side for side in "LR" if side not in self.found.eyes and self._eye(side)]
+        if not self.found.of(LASHES):
+            self._laid_on(LASHES)
+        if len(fitted) == 2:
+            self._laid_on(SKIN)
+        self._mouth()
+        return self.out
+
+    def _eye(self, side: str) -> bool:
+        """Whether an eyeball of the template is now in the head."""
+        ball = self.like.eyes.get(side)
+        lids = find_eyelids(self.skin, ball) if ball is not None else None
+        if ball is None or lids is None:
+            return False
+        way = self._seat(ball, lids)
+        new = Eyeball(side, way.point(ball.middle), way.scale * ball.radius,
+                      way.point(ball.points), ball.triangles)  # fmt: skip
+        opening = find_opening(near_eye(self.target, new), new)
+        if opening is None or _size(opening) < _SEEN * _size(lids.opening):
+            self.out.notes.append(f"the {_SIDES[side]} eye is painted on the skin, or closed: no "
+                                  "eyeball is fitted in")  # fmt: skip
+            return False
+        self.out.eyes[side] = new
+        for row in self.like.of(EYE):
+            if row.side == side:
+                self._add(row, way)
+        self.out.notes.append(f"the {_SIDES[side]} eyeball is the template's")
+        return True
+
+    def _seat(self, ball: Eyeball, lids: Eyelids) -> Similarity:
+        """An eyeball behind the lids: as large as the opening asks for, and so deep that the lids
+        lie on it as they do on the template's."""
+        rim, height = lids.rim(_RIM)
+        near = similarity(self.skin.points[rim], self.laid[rim])
+        front = near.turn @ lids.opening.frame.front
+        # Where the eye lies the lids say, not where it looks.
+        way = Similarity(np.eye(3), near.scale, ball.middle, near.point(ball.middle))
+        middle, radius = way.point(ball.middle), way.scale * ball.radius
+        low, high = -radius, radius
+        for _ in range(40):
+            depth = (low + high) / 2
+            away = np.linalg.norm(self.laid[rim] - middle - depth * front, axis=1)
+            over = float(np.median(away - radius - way.scale * height))
+            low, high = (depth, high) if over > 0 else (low, depth)
+        return way.shifted((low + high) / 2 * front)
+
+    def _laid_on(self, kind: str) -> None:
+        """Lashes and the like, carried by the skin that they lie on."""
+        rows = self.like.of(kind)
+        for row in rows:
+            mesh = row.part.mesh
+            follow = Followers(self.skin, mesh.positions, islands_of(mesh), _PATCH)
+            points = follow.carried(self.laid - self.skin.points, sized=True)
+            part = replace(row.part, mesh=replace(mesh, positions=points))
+            self.out.rows.append(replace(row, part=part, own=False))
+        if rows and kind == LASHES:
+            self.out.notes.append("the lashes are the template's")
+
+    def _mouth(self) -> None:
+        """Teeth, gums and tongue, each that is missing, by one similarity."""
+        missing = [kind for kind in (TEETH, GUMS, TONGUE) if not self.found.of(kind)]
+        if TEETH not in missing and GUMS in missing:
+            missing.remove(GUMS)  # its own teeth have gums of their own, or none are wanted
+        rows = self.like.of(*missing)
+        teeth = self.like.of(TEETH, GUMS)
+        if not rows or not teeth:
+            return
+        points = np.concatenate([row.part.mesh.positions for row in teeth])
+        low, high = points.min(axis=0) - _AROUND, points.max(axis=0) + _AROUND
+        near = ((self.skin.points > low) & (self.skin.points < high)).all(axis=1)
+        if np.count_nonzero(near) < 8:
+            return
+        way = similarity(self.skin.points[near], self.laid[near])
+        if TEETH in missing:
+            way = self._behind(way, near, teeth)
+        for row in rows:
+            self._add(row, way)
+        names = {TEETH: "teeth", GUMS: "gums", TONGUE: "tongue"}
+        said = [names[kind] for kind in missing if self.like.of(kind)]
+        self.out.notes.append(f"from the template: {', '.join(said)}")
+
+    def _behind(self, way: Similarity, near: Mask, teeth: list[Fitted]) -> Similarity:
+        """Teeth that go back until they do not come through the lips."""
+        rest = self._through(self.skin.points[near], teeth, None)
+        for _ in range(_STEPS):
+            deep = self._through(self.laid[near], teeth, way)
+            if (deep - rest).max(initial=0.0) < _THROUGH:
+                break
+            way = way.shifted(np.array([0.0, 0.0, -_STEP]))
+        return way
+
+    def _through(self, points: Doubles, teeth: list[Fitted], way: Similarity | None) -> Doubles:
+        """float64[n]: how deep points of the skin are in teeth, cm."""
+        out = np.zeros(len(points))
+        for row in teeth:
+            solid = row.surface()
+            places = solid.points if way is None else way.point(solid.points)
+            tree = ClosestPoints(places, np.ascontiguousarray(solid.triangles, np.int32))
+            triangle, shares, distance = tree.nearest(points)
+            posed = Surface(places, solid.triangles)
+            normal = posed.face_normals()[triangle]
+            arm: Doubles = points - posed.at(triangle.astype(np.int64), shares)
+            inside = (arm * normal).sum(axis=1) < 0
+            out = np.maximum(out, np.where(inside & (distance < 0.5), distance, 0.0))
+        return out
+
+    def _add(self, row: Fitted, way: Similarity) -> None:
+        mesh = replace(row.part.mesh, positions=way.point(row.part.mesh.positions))
+        shapes = {name: way.way(delta) for name, delta in row.part.shapes.items()}
+        self.out.rows.append(
+            replace(row, part=replace(row.part, mesh=mesh, shapes=shapes), own=False)
+        )
+
+
+def _size(opening: Opening) -> float:
+    """How much is seen, a share of the sphere around the eye."""
+    heights = (opening.high - opening.low) * np.cos(opening.across)
+    return float(heights.mean() * (opening.across[-1] - opening.across[0]))
+
+
+def head_parts(fittings: Fittings, expressions: Mapping[str, Doubles]) -> list[HeadPart]:
+    """All meshes of a head with what expressions do to them: lashes go with their lids, brows and
+    the like with their skin; the rest is rigid, or has shapes of its own.
+
+    Args:
+        fittings: of the head.
+        expressions: float64[V, 3] of the skin by raw control.
+    """
+    face = fittings.face
+    skin = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
+    out = [replace(face, shapes=dict(expressions))]
+    for row in fittings.rows:
+        if row.kind not in (LASHES, BROWS, SKIN):
+            out.append(row.part)
+            continue
+        islands = islands_of(row.part.mesh) if row.kind == LASHES else None
+        follow = Followers(skin, row.part.mesh.positions, islands)
+        shapes = follow.ways(dict(expressions))
+        out.append(replace(row.part, shapes=row.part.shapes | shapes))
+    return out

@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: MIT
+"""What each mesh of a head without expressions is, by names, by form and by place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...author.geometry.skeleton import Doubles, Ints
+from ...author.heads.islands import islands_of
+from ...author.heads.parts import HeadPart, first_vertices, taken_apart
+from ...author.heads.turning import Eye, take_eyes
+from ...author.input.obj import ObjMesh
+from ...base.errors import ArgumentError
+from ...base.words import counted
+from ..eyes.eyeballs import Eyeball
+from ..surface import Surface
+from .fitted import (
+    BROWS,
+    EYE,
+    GUMS,
+    HAIR,
+    HEAD,
+    JAW,
+    LASHES,
+    OTHER,
+    SKIN,
+    TEETH,
+    TONGUE,
+    Fitted,
+    Fittings,
+)
+
+_NAMES = (
+    (LASHES, r"lash"),
+    (BROWS, r"brow"),
+    (SKIN, r"cornea|tear|wet|eye_?(edge|shell|line)|occlu|caruncle|cartilage|beard|mous?tache"),
+    (TONGUE, r"tongue"),
+    (GUMS, r"gum"),
+    (TEETH, r"teeth|tooth|dent"),
+    (HAIR, r"hair|scalp|fringe|pony|bang"),
+    (OTHER, r"shirt|cloth|collar|body|glass|hat|helmet|earring"),
+)  # fmt: skip
+_LOWER = re.compile(r"low|bottom|down|mandib|(?:^|[_\W])[dl](?:[_\W]|$)", re.IGNORECASE)
+_UPPER = re.compile(r"upp?|top|maxill|(?:^|[_\W])u(?:[_\W]|$)", re.IGNORECASE)
+_HEIGHT = 23.0  # cm, of a face
+_NEAR = 2.6  # of an eye's radius: where its lids are
+_AT_EYE = 2.4  # of an eye's radius: how far lashes reach
+_LASH = 0.25  # of the face's height: nothing at an eye is larger
+_MOUTH_HALF, _MOUTH_HIGH = 3.6, 4.0  # cm about the middle, of what may be teeth or a tongue
+_LARGE = 9.0  # cm: hair at least
+
+
+def sort_parts(parts: Sequence[HeadPart]) -> Fittings:
+    """The skin of a head, its eyes, and what each other mesh is.
+
+    Args:
+        parts: all meshes, in cm, y up, the face towards +z, left at +x.
+
+    Raises:
+        ArgumentError: no mesh with polygons.
+    """
+    able = [part for part in parts if part.mesh.faces]
+    if not able:
+        raise ArgumentError("a mesh with polygons was expected, found none")
+    rest, eyes = take_eyes(able, _HEIGHT, {})
+    islands = [piece for part in rest for piece in _pieces(part, eyes)]
+    face = _face(islands, eyes)
+    out = Fittings(face)
+    for eye in eyes:
+        out.eyes[eye.side] = eyeball_of(eye)
+        out.rows.extend(Fitted(EYE, part, eye.side) for part in eye.parts)
+    place = _Place(face, eyes)
+    others = [piece for piece in islands if piece is not face]
+    own = [piece for piece in others if piece.source == face.source and _is_skin(piece, place)]
+    if own:  # crumbs of a scan, ears: the mesh stays one
+        others = [piece for piece in others if all(piece is not crumb for crumb in own)]
+        face = out.face = _in_one([face, *own], face.name)
+    whole = [part for part in rest if part.source == face.source]
+    if len(whole) == 1 and len(whole[0].mesh.faces) == len(face.mesh.faces):
+        out.face = whole[0]  # nothing was taken out of it: its vertices keep their numbers
+    for piece in _gathered(others, place):
+        out.rows.append(piece)
+    _divide_mouth(out, place)
+    out.notes.extend(_said(out))
+    return out
+
+
+def eyeball_of(eye: Eye) -> Eyeball:
+    """An eye's ball with its cornea as lids meet it.
+
+    Args:
+        eye: what take_eyes found.
+    """
+    points, triangles, first = [], [], 0
+    for part in eye.parts:
+        surface = Surface.of_polygons(part.mesh.positions, part.mesh.faces)
+        points.append(surface.points)
+        triangles.append(surface.triangles + first)
+        first += len(surface.points)
+    ball = eye.ball
+    return Eyeball(eye.side, ball.middle, ball.radius, np.concatenate(points),
+                   np.concatenate(triangles))  # fmt: skip
+
+
+def _pieces(part: HeadPart, eyes: Sequence[Eye]) -> list[HeadPart]:
+    """A mesh, or its islands where one of them may be the skin of the face."""
+    if _named(part.name) is not None:
+        return [part]
+    labels = islands_of(part.mesh)
+    count = int(labels.max()) + 1
+    if count == 1:
+        return [part]
+    sizes = np.bincount(labels, minlength=count)
+    main = int(sizes.argmax())
+    if eyes:
+        near = np.zeros(count)
+        for eye in eyes:
+            away = np.linalg.norm(part.mesh.positions - eye.ball.middle, axis=1)
+            close = labels[away < _NEAR * eye.ball.radius]
+            near += np.minimum(np.bincount(close, minlength=count), 1) * count
+        main = int((near * sizes).argmax()) if near.any() else main
+    order = np.argsort(np.argsort(-sizes, kind="stable"), kind="stable")
+    name = [part.name, *(f"{part.name}_{k}" for k in range(1, count))]
+    of_island = np.where(np.arange(count) == main, 0, 1 + order)
+    of_island = np.unique(of_island, return_inverse=True)[1]
+    return taken_apart(part, name, of_island[labels[first_vertices(part)]])
+
+
+def _named(name: str) -> str | None:
+    for kind, words in _NAMES:
+        if re.search(words, name, re.IGNORECASE):
+            return kind
+    return None
+
+
+def _face(islands: Sequence[HeadPart], eyes: Sequence[Eye]) -> HeadPart:
+    """The island with most vertices around both eyes, else the largest one."""
+    able = [piece for piece in islands if _named(piece.name) is None] or list(islands)
+
+    def around(piece: HeadPart) -> tuple[int, int]:
+        counts = [
+            int((np.linalg.norm(piece.mesh.positions - eye.ball.middle, axis=1)
+                 < _NEAR * eye.ball.radius).sum())
+            for eye in eyes
+        ]  # fmt: skip
+        return (min(counts) if counts else 0, len(piece.mesh.positions))
+
+    return max(able, key=around)
+
+
+class _Place:
+    """Where the eyes and the mouth of a face are, roughly."""
+
+    def __init__(self, face: HeadPart, eyes: Sequence[Eye]) -> None:
+        self.eyes = eyes
+        points = face.mesh.positions
+        self.middle = float((points[:, 0].min() + points[:, 0].max()) / 2)
+        if eyes:
+            self.middle = float(np.mean([eye.ball.middle[0] for eye in eyes]))
+            self.eye_height = float(np.mean([eye.ball.middle[1] for eye in eyes]))
+            apart = float(np.ptp([eye.ball.middle[0] for eye in eyes]))
+        else:
+            self.eye_height = float(points[:, 1].max()) - 0.45 * _HEIGHT
+            apart = 6.3
+        self.unit = max(apart / 6.3, 0.5)  # of a human face
+        near = np.abs(points[:, 0] - self.middle) < 2.5 * self.unit
+        near &= np.abs(points[:, 1] - self.mouth_height) < 2.0 * self.unit
+        self.front = float(points[near, 2].max()) if near.any() else float(points[:, 2].max())
+
+    @property
+    def mouth_height(self) -> float:
+        return self.eye_height - 7.0 * self.unit
+
+    def in_mouth(self, points: Doubles) -> bool:
+        """Whether a mesh lies behind the lips."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        middle = (low + high) / 2
+        return bool(
+            abs(middle[0] - self.middle) < 1.0 * self.unit
+            and high[0] - low[0] < 2 * _MOUTH_HALF * self.unit
+            and abs(middle[1] - self.mouth_height) < _MOUTH_HIGH * self.unit
+            and high[1] - low[1] < _MOUTH_HIGH * self.unit
+            and high[2] < self.front + 0.3 * self.unit
+            and high[2] > self.front - 8.0 * self.unit
+        )
+
+    def at_eye(self, points: Doubles) -> bool:
+        """Whether a small mesh lies around an eye."""
+        if np.ptp(points, axis=0).max() > _LASH * _HEIGHT * self.unit:
+            return False
+        return any(
+            bool((np.linalg.norm(points - eye.ball.middle, axis=1)
+                  < _AT_EYE * eye.ball.radius).all())
+            for eye in self.eyes
+        )  # fmt: skip
+
+
+def _gathered(pieces: Sequence[HeadPart], place: _Place) -> list[Fitted]:
+    """Each mesh with its kind; islands of one mesh and one kind are one again."""
+    groups: dict[tuple[str, str], list[HeadPart]] = {}
+    for piece in pieces:
+        kind = _named(piece.name) or _by_place(piece, place)
+        groups.setdefault((kind, piece.source), []).append(piece)
+    return [Fitted(kind, _joined(own, kind)) for (kind, _), own in groups.items()]
+
+
+def _is_skin(piece: HeadPart, place: _Place) -> bool:
+    return _named(piece.name) is None and _by_place(piece, place) in (SKIN, OTHER)
+
+
+def _by_place(piece: HeadPart, place: _Place) -> str:
+    points = piece.mesh.positions
+    if place.at_eye(points):
+        return LASHES if _is_flat(points) else SKIN
+    if place.in_mouth(points):
+        deep, wide = float(np.ptp(points[:, 2])), float(np.ptp(points[:, 0]))
+        low = (points[:, 1].min() + points[:, 1].max()) / 2 < place.mouth_height
+        full = len(points) > 30 and deep > 0.9 * wide and deep > 2.5 * place.unit
+        # Rows of teeth are arches: there is nothing in their middle.
+        middle = np.abs(points[:, 0] - place.middle) < 0.15 * wide
+        filled = np.ptp(points[middle, 2]) > 0.7 * deep if middle.any() else False
+        return TONGUE if full and filled and low else TEETH
+    if np.ptp(points, axis=0).max() > _LARGE * place.unit:
+        return HAIR if points[:, 1].max() > place.eye_height else OTHER
+    return SKIN if piece.mesh.positions[:, 1].min() > place.mouth_height - 8 else OTHER
+
+
+def _is_flat(points: Doubles) -> bool:
+    """Whether a mesh is no shell around a ball: lashes are wide and of little height."""
+    extent = np.sort(np.ptp(points, axis=0))
+    return bool(extent[0] < 0.6 * extent[2])
+
+
+def _joined(pieces: Sequence[HeadPart], kind: str) -> HeadPart:
+    """Islands of a mesh in one mesh again."""
+    first = pieces[0]
+    name = first.name if len(pieces) == 1 and _named(first.name) else _called(first, kind)
+    if len(pieces) == 1:
+        first.name = name
+        return first
+    return _in_one(pieces, name)
+
+
+def _in_one(pieces: Sequence[HeadPart], name: str) -> HeadPart:
+    """Parts of one object as one mesh, their polygons in the object's order."""
+    first = pieces[0]
+    numbers = np.concatenate(
+        [
+            piece.polygons if piece.polygons is not None else np.arange(len(piece.mesh.faces))
+            for piece in pieces
+        ]
+    )
+    faces: list[list[int]] = []
+    uv_faces: list[list[int]] = []
+    start = 0
+    for piece in pieces:
+        faces.extend([v + start for v in face] for face in piece.mesh.faces)
+        uv_faces.extend(piece.mesh.uv_faces)
+        start += len(piece.mesh.positions)
+    order = np.argsort(numbers, kind="stable")
+    mesh = ObjMesh(
+        np.concatenate([piece.mesh.positions for piece in pieces]),
+        first.mesh.uvs,
+        [faces[k] for k in order],
+        [uv_faces[k] for k in order],
+    )
+    return HeadPart(name, mesh, {}, first.material, first.source, numbers[order])
+
+
+def _called(piece: HeadPart, kind: str) -> str:
+    words = {LASHES: "eyelashes", BROWS: "eyebrows", TEETH: "teeth", TONGUE: "tongue", GUMS: "gums"}
+    return words.get(kind, piece.name)
+
+
+def _divide_mouth(out: Fittings, place: _Place) -> None:
+    """Upper teeth on the head, lower teeth and tongue on the jaw."""
+    rows: list[Fitted] = []
+    for row in out.rows:
+        if row.kind == TONGUE:
+            row.hangs = JAW
+            row.part.name = _with(row.part.name, "tongue")
+        if row.kind not in (TEETH, GUMS):
+            rows.append(row)
+            continue
+        rows.extend(_rows_of_teeth(row, place, out.notes))
+    out.rows = rows
+
+
+def _rows_of_teeth(row: Fitted, place: _Place, notes: list[str]) -> list[Fitted]:
+    name = row.part.name
+    word = "gums" if row.kind == GUMS else "teeth"
+    if _LOWER.search(name) and not _UPPER.search(name):
+        return [Fitted(row.kind, row.part, "", JAW)]
+    if _UPPER.search(name):
+        return [Fitted(row.kind, row.part, "", HEAD)]
+    labels: Ints = islands_of(row.part.mesh)
+    heights = row.part.mesh.positions[:, 1]
+    count = int(labels.max()) + 1
+    centers = np.array(
+        [(heights[labels == i].min() + heights[labels == i].max()) / 2 for i in range(count)]
+    )
+    if count == 1:
+        lower = bool(centers[0] < place.mouth_height) and "tongue" not in name
+        notes.append(f"{name} is one piece: it hangs on the {'jaw' if lower else 'head'}")
+        return [Fitted(row.kind, row.part, "", JAW if lower else HEAD)]
+    low = centers < (centers.min() + centers.max()) / 2
+    pieces = taken_apart(
+        row.part,
+        [f"{word}Upper", f"{word}Lower"],
+        low[labels[first_vertices(row.part)]].astype(np.int64),
+    )
+    return [
+        Fitted(row.kind, piece, "", JAW if piece.name == f"{word}Lower" else HEAD)
+        for piece in pieces
+    ]
+
+
+def _with(name: str, word: str) -> str:
+    return name if word in name.lower() else f"{word}_{name}"
+
+
+def _said(out: Fittings) -> list[str]:
+    notes = []
+    if out.eyes:
+        names = dict.fromkeys(row.part.source or row.part.name for row in out.of(EYE))
+        notes.append(f"{', '.join(names)}: the eyes are the head's own")
+    for kind, words in (
+        (TEETH, "the teeth"), (GUMS, "the gums"), (TONGUE, "the tongue"), (LASHES, "the lashes"),
+        (BROWS, "the brows"), (HAIR, "the hair"),
+    ):  # fmt: skip
+        rows = out.of(kind)
+        if rows:
+            names = dict.fromkeys(row.part.source or row.part.name for row in rows)
+            notes.append(f"{', '.join(names)}: {words}")
+    left = out.of(OTHER, SKIN)
+    if left:
+        notes.append(f"{counted(len(left), 'mesh')} more hang on the head or on its skin")
+    return notes

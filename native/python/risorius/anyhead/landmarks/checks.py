@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""Meshes that are no head, or none that a rig can be made of: a sentence each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...author.geometry.simplify import connected
+from ...author.geometry.skeleton import Doubles, Ints
+from ..form.fitting import Pose, Target
+from ..surface import Surface
+from .marks import LandmarkError
+
+LEAST, MOST = 200, 1_000_000  # vertices of a head
+_FLAT = 0.02  # of a mesh' size: so near to a plane its border lies in it
+_CUT = 0.3  # of the border: where so much of it lies in a plane the mesh was cut there
+_DEEP = 0.12  # cm of the form: a step so deep between the lids is an opening
+_ROWS, _COLUMNS = 25, 5  # rays through an eye
+_CROSSED = 0.04  # of the edges of a face that go through it, where it intersects itself
+
+
+def check_mesh(where: str, surface: Surface) -> None:
+    """Ends where a mesh cannot be looked at.
+
+    Args:
+        where: what the error calls it.
+        surface: the mesh.
+
+    Raises:
+        LandmarkError: no numbers, too few vertices or too many.
+    """
+    bad = np.flatnonzero(~np.isfinite(surface.points).all(axis=1))
+    if len(bad):
+        raise LandmarkError(
+            f"{where}: vertex {bad[0]}: three finite numbers were expected, found "
+            f"{', '.join(f'{x:g}' for x in surface.points[bad[0]])}"
+        )
+    used = len(np.unique(surface.triangles))
+    if used < LEAST:
+        raise LandmarkError(
+            f"{where}: a head of {LEAST} vertices or more was expected, found {used}"
+        )
+    if used > MOST:
+        raise LandmarkError(
+            f"{where}: at most {MOST:,} vertices were expected, found {used:,}: decimate the mesh"
+        )
+
+
+def pieces(surface: Surface) -> list[Surface]:
+    """The parts of a surface that stand apart, the largest first; what overlaps is one part.
+
+    Args:
+        surface: it stays as it is.
+    """
+    corners = surface.triangles
+    label = connected(len(surface.points), corners.ravel(), np.full(len(corners), 3))
+    own, of_triangle = np.unique(label[corners[:, 0]], return_inverse=True)
+    low = np.full((len(own), 3), np.inf)
+    high = np.full((len(own), 3), -np.inf)
+    for k in range(3):
+        np.minimum.at(low, of_triangle, surface.points[corners[:, k]])
+        np.maximum.at(high, of_triangle, surface.points[corners[:, k]])
+    group = _overlapping(low, high)[of_triangle]
+    out = [Surface(surface.points, corners[group == g]) for g in np.unique(group)]
+    return sorted(out, key=lambda s: -len(s.triangles))
+
+
+def _overlapping(low: Doubles, high: Doubles) -> Ints:
+    """int64[n]: a number for the boxes that overlap one another, directly or through others."""
+    out = np.arange(len(low))
+    if len(low) > 2000:  # hair of many strands
+        return np.zeros(len(low), np.int64)
+    for _ in range(len(low)):
+        met = ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
+        new = np.where(met, out[None], len(low)).min(axis=1)
+        if np.array_equal(new, out):
+            break
+        out = new
+    return out
+
+
+def completed(surface: Surface) -> list[Surface]:
+    """A surface with its mirror image, for each side on which it ends in a plane along the axes.
+
+    Args:
+        surface: it stays as it is.
+    """
+    points = surface.points
+    border = points[surface.border()]
+    if not len(border):
+        return []
+    out = []
+    low, high = points.min(axis=0), points.max(axis=0)
+    for axis in range(3):
+        for end in (low[axis], high[axis]):
+            at_end = np.abs(border[:, axis] - end) < _FLAT * (high - low).max()
+            if at_end.mean() < _CUT:
+                continue
+            mirrored = points.copy()
+            mirrored[:, axis] = 2 * end - points[:, axis]
+            other = surface.triangles[:, ::-1] + len(points)
+            out.append(
+                Surface(
+                    np.concatenate([points, mirrored]),
+                    np.concatenate([surface.triangles, other]),
+                )
+            )
+    return out
+
+
+def check_eyes(where: str, target: Target, pose: Pose, points: dict[str, Doubles]) -> None:
+    """Ends where neither eye has an opening between its lids.
+
+    Args:
+        where: what the error calls the head.
+        target: the surface.
+        pose: of the form in it.
+        points: float64[3] of the landmarks by name.
+
+    Raises:
+        LandmarkError: both are closed or painted on.
+    """
+    if not any(_opens(target, pose, points, side) for side in "LR"):
+        raise LandmarkError(
+            f"{where}: the eyes have no openings between the lids (painted or closed): cut them "
+            "open, lids cannot move otherwise"
+        )
+
+
+def _opens(target: Target, pose: Pose, points: dict[str, Doubles], side: str) -> bool:
+    """Whether rays from the front meet a step, an end or another piece between the lids."""
+    names = [f"{n}_{side}" for n in ("eye_inner", "eye_outer", "lid_upper", "lid_lower")]
+    inner, outer, upper, lower = (pose.back(points[name][None])[0] for name in names)
+    rows = np.linspace(-0.6, 1.6, _ROWS)[:, None, None]
+    columns = np.linspace(-0.2, 0.2, _COLUMNS)[None, :, None]
+    places = lower + rows * (upper - lower) + columns * (outer - inner)
+    places[..., 2] += 3.0
+    start = pose.place(places.reshape(-1, 3))
+    ahead = np.broadcast_to(-pose.rotation[:, 2], start.shape)
+    triangle, _, far = target.closest.first_hit(start, ahead, 12.0 * pose.scale)
+    depth = np.where(triangle >= 0, far / pose.scale, 12.0).reshape(_ROWS, _COLUMNS)
+    apart = float(np.linalg.norm(upper - lower)) * 2.2 / (_ROWS - 1)
+    steps = np.abs(np.diff(depth, axis=0))
+    return bool((steps > _DEEP + 1.5 * apart).any(axis=0).mean() > 0.5)
+
+
+def lips_apart(target: Target, pose: Pose, points: dict[str, Doubles]) -> bool:
+    """Whether the lips are two: no short way along the surface leads from one to the other.
+
+    Args:
+        target: the surface.
+        pose: of the form in it.
+        points: float64[3] of the landmarks by name.
+    """
+    left, right = (pose.back(points[f"mouth_corner_{s}"][None])[0] for s in "LR")
+    upper, lower = (pose.back(points[f"lip_{n}_outer"][None])[0] for n in ("upper", "lower"))
+    surface = target.surface
+    inside = pose.back(surface.points)
+    middle, wide = (left + right) / 2, 0.3 * float(np.linalg.norm(left - right))
+    tall = 0.5 * float(np.linalg.norm(upper - lower))
+    box = np.abs(inside - [middle[0], (upper[1] + lower[1]) / 2, upper[2] - 0.5])
+    kept = (box < [wide, 1.3 * tall, 1.1]).all(axis=1)[surface.triangles].all(axis=1)
+    corners = surface.triangles[kept]
+    if not len(corners):
+        return True
+    label = connected(len(inside), corners.ravel(), np.full(len(corners), 3))
+    own = np.unique(corners)
+    ends = []
+    for place in (upper, lower):
+        ends.append(label[own[((inside[own] - place) ** 2).sum(axis=1).argmin()]])
+    return bool(ends[0] != ends[1])
+
+
+def crossed(target: Target, pose: Pose) -> float:
+    """Share of the edges of a face that go through it.
+
+    Args:
+        target: the surface.
+        pose: of the form in it.
+    """
+    surface = target.surface
+    inside = pose.back(surface.points)
+    face = (np.abs(inside - [0.0, -2.5, 0.0]) < [7.5, 8.0, 6.0]).all(axis=1)
+    edges = Surface(surface.points, surface.triangles[face[surface.triangles].all(axis=1)]).edges()
+    if not len(edges):
+        return 0.0
+    begin, way = surface.points[edges[:, 0]], np.diff(surface.points[edges], axis=1)[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    begin, way, length = begin[length > 0], way[length > 0], length[length > 0]
+    ahead = way / length[:, None]
+    triangle, _, far = target.closest.first_hit(begin + 0.02 * way, ahead)
+    return float(((triangle >= 0) & (far < 0.96 * length)).mean())

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Landmarks finer than a whole head's fit: the model laid anew onto each region by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...author.geometry.skeleton import Doubles
+from ..form.fitting import Pose, Step, Target, fit
+from ..form.heads import HeadForm, head_form
+
+_ALL = 1 << 20
+
+
+@dataclass(frozen=True)
+class Region:
+    """A part of the face that is fitted by itself.
+
+    Attributes:
+        begins: how the names of its landmarks begin.
+        sides: whether the left and the right one are regions of their own.
+        width: cm of the form: how far off its middle half of the weight is gone, nearly.
+        prior: how strongly the form's parts are held.
+        least_cosine: between the normals of a pair.
+    """
+
+    begins: tuple[str, ...]
+    sides: bool
+    width: float
+    prior: float
+    least_cosine: float
+
+
+REGIONS = (
+    Region(("eye_", "lid_"), True, 2.5, 0.5, 0.5),
+    Region(("mouth_", "lip_"), False, 5.0, 0.7, 0.6),
+    Region(("nose_", "nostril_"), False, 3.5, 0.7, 0.5),
+    Region(("ear_",), True, 4.5, 0.7, 0.4),
+)
+_STRAYED = 1.2  # cm of the form: a region that goes farther has found something else
+_SEEN = 0.02  # weights below count as none
+
+
+def refined(target: Target, pose: Pose) -> dict[str, Doubles]:
+    """float64[3] of each landmark, in the surface's space.
+
+    Args:
+        target: the surface.
+        pose: of the form in it.
+    """
+    form = head_form()
+    points = pose.points(form)
+    out = {name: points[vertex] for name, vertex in form.places.items()}
+    for region in REGIONS:
+        for side in ("_L", "_R") if region.sides else ("",):
+            names = [n for n in form.places if n.startswith(region.begins) and n.endswith(side)]
+            out |= _of_region(target, pose, region, form, names)
+    return out
+
+
+def _of_region(
+    target: Target, pose: Pose, region: Region, form: HeadForm, names: list[str]
+) -> dict[str, Doubles]:
+    places = [form.places[name] for name in names]
+    away = np.linalg.norm(form.mean - form.mean[places].mean(axis=0), axis=1)
+    weights = np.exp(-((away / region.width) ** 2))
+    weights[weights < _SEEN] = 0.0
+    parts = len(form.parts)
+    steps = tuple(
+        Step(6, reach, _ALL, parts, region.prior, region.least_cosine) for reach in (0.4, 0.25)
+    )
+    before = pose.points(form)[places]
+    points = fit(target, pose, steps, weights=weights).points(form)
+    if np.linalg.norm(points[places] - before, axis=1).max() > _STRAYED * pose.scale:
+        return {}
+    return {name: points[vertex] for name, vertex in zip(names, places, strict=True)}

@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: MIT
+"""A head without expressions gets those of a template: from meshes to a face of blend shapes.
+
+parts -> standing -> laying -> transfer -> fittings, repair -> author's joining -> ShapeSet -> Dna
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .. import Conditionals, Dna
+from ..author.correctives import add_correctives
+from ..author.geometry.skeleton import Doubles
+from ..author.heads.joining import join
+from ..author.heads.parts import HeadPart, Wishes
+from ..author.input.matching import Assignment
+from ..author.input.shape_face import (
+    ShapeSet,
+    check_shapes,
+    combined_rows,
+    make_shape_face,
+    shape_set,
+    take_combined,
+)
+from ..author.input.spec import Read
+from ..base.words import counted
+from .errors import Stopped
+from .fittings import Fittings, complete, head_parts, sort_parts
+from .landmarks.marks import Landmarks
+from .laying import lay
+from .repair import repair
+from .standing import Standing, stand
+from .surface import Surface
+from .transfer.template import Floats, Pose, Progress, read_template
+from .transfer.transfer import TransferOptions, transfer
+
+Say = Callable[[str], None]
+# Shares of the work at whose ends the steps are.
+_FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
+
+
+@dataclass(frozen=True)
+class OntoOptions:
+    """How a head gets expressions.
+
+    Attributes:
+        strength: 0 to 1.5, what all expressions are multiplied with.
+        repaired: whether lids, lips and what lies in others are mended.
+        marks: landmarks that a person gave, in the space of the head's meshes.
+        wishes: what is said of the head and not guessed.
+        threads: 0: one for each core.
+    """
+
+    strength: float = 1.0
+    repaired: bool = True
+    marks: Landmarks | None = None
+    wishes: Wishes = field(default_factory=Wishes)
+    threads: int = 0
+
+
+@dataclass
+class Onto:
+    """A head with expressions.
+
+    Attributes:
+        shapes: the head, standing; its expressions are called as the template's controls, and
+            those of correctives by theirs with a + between.
+        landmarks: in the space that the meshes had.
+        notes: what was guessed and done, a sentence each; those of shape_face come beside.
+    """
+
+    shapes: ShapeSet
+    landmarks: Landmarks
+    notes: list[str] = field(default_factory=list)
+
+
+def onto(
+    where: str,
+    parts: Sequence[HeadPart],
+    unit: str,
+    template: Dna,
+    options: OntoOptions | None = None,
+    progress: Progress | None = None,
+    say: Say | None = None,
+) -> Onto:
+    """Puts the expressions of a template onto a head.
+
+    Args:
+        where: what errors call the head; its name is the face's.
+        parts: its meshes in one space; shapes of their own are left out.
+        unit: of their numbers as the format has it, "cm" or "m".
+        template: a face with expressions.
+        options: how strong they are, and what is known of the head.
+        progress: told the share that is done, 0 to 1; False stops.
+        say: told each step, a sentence.
+
+    Raises:
+        AnyHeadError: meshes, a template or options that cannot be used.
+        LandmarkError: no face in the meshes, or landmarks that are missing.
+        RegistrationError: the template finds no place on the head.
+        ShapeFileError: the meshes make no head.
+        Stopped: progress said False.
+    """
+    o, tell = options or OntoOptions(), say or _silent
+    notes = _own_shapes(parts)
+    tell("looking for the face")
+    _at(progress, 0.0)
+    head = stand(where, parts, unit, o.wishes, o.marks)
+    found = sort_parts(head.parts)
+    face = found.face
+    target = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
+    tell("reading the template")
+    _at(progress, _FACE)
+    source = read_template(template, _part(progress, _FACE, _TEMPLATE))
+    tell(f"laying {counted(len(source.surface.points), 'vertex', 'vertices')} of the template onto "
+         f"{len(target.points):,} of the head")  # fmt: skip
+    laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
+    tell(f"carrying {counted(len(source.ways), 'expression')} over")
+    wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
+    carried = transfer(source, target, laid.points, laid.trust, wanted, rest)
+    fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
+    mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
+    every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})
+    every[0].shapes |= {"+".join(p): way for p, way in mended.items() if len(p) > 1}
+    names = {name: [name] for name in source.controls}
+    joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
+    shapes = shape_set(template.name or "head", joined)
+    _at(progress, 1.0)
+    return Onto(shapes, head.own, [*notes, *head.notes, *fitted.notes, *joined.notes])
+
+
+def _mended(
+    target: Surface,
+    fitted: Fittings,
+    head: Standing,
+    ways: dict[Pose, Doubles],
+    o: OntoOptions,
+    progress: Progress | None,
+    tell: Say,
+) -> dict[Pose, Doubles]:
+    """The same poses, repaired where that is wished."""
+    if not o.repaired or not o.strength:
+        return ways
+    tell("closing lids and lips, taking skin out of eyes and teeth")
+    out = repair(
+        target, fitted.face.mesh.faces, fitted, head.found.landmarks, None,
+        {pose[0]: way for pose, way in ways.items() if len(pose) == 1},
+        {pose: way for pose, way in ways.items() if len(pose) > 1},
+        progress,
+    )  # fmt: skip
+    return {(name,): way for name, way in out.expressions.items()} | dict(out.combinations)
+
+
+def shape_face(made: Onto, template: Dna, where: str) -> Read:
+    """The face of blend shapes of what was made, as author.input.spec.read_face gives it.
+
+    Args:
+        made: the head with expressions; it is used up.
+        template: whose board of controls the face gets.
+        where: what errors call the head.
+
+    Raises:
+        ArgumentError: no expression moves a vertex.
+    """
+    shapes = made.shapes
+    together = {  # a tongue that is not there meets no lip
+        name: delta
+        for name, delta in take_combined(shapes).items()
+        if set(name.split("+")) <= set(shapes.expressions)
+    }
+    odd = [note for note in check_shapes(shapes) if "moves nothing" not in note]
+    controls = {name: [name] for name in shapes.expressions}
+    dna = make_shape_face(shapes, controls)
+    looks = zip(dna.mesh_names, (part.material for part in shapes.parts), strict=True)
+    materials = {name: look for name, look in looks if look is not None}
+    rows = combined_rows(where, shapes, together, controls, dna.raw_control_names)
+    if rows:
+        face = shapes.parts[0]
+        own = [(which, delta[face.start : face.stop]) for which, delta in rows]
+        dna = add_correctives(dna, 0, own)
+    _copy_board(template, dna)
+    return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
+
+
+def whole_ways(ways: Mapping[Pose, Floats]) -> dict[Pose, Doubles]:
+    """float64[V, 3] by pose, the whole way of all its controls, of what transfer gives.
+
+    Args:
+        ways: of controls alone, and what is left over of those of correctives.
+    """
+    out = {}
+    for pose in ways:
+        parts = [way for other, way in ways.items() if set(other) <= set(pose)]
+        out[pose] = np.sum(parts, axis=0, dtype=np.float64)
+    return out
+
+
+def _own_shapes(parts: Sequence[HeadPart]) -> list[str]:
+    count = len({name for part in parts for name in part.shapes})
+    return [f"{counted(count, 'shape')} of the head itself left out"] if count else []
+
+
+def _copy_board(template: Dna, dna: Dna) -> None:
+    """The controls for hands of a template, as far as what they lead is there."""
+    names = {name.rpartition(".")[2]: i for i, name in enumerate(dna.raw_control_names)}
+    table = template.gui_to_raw
+    led = [template.raw_control_names[int(c)].rpartition(".")[2] for c in table.output_indices]
+    kept = np.flatnonzero([name in names for name in led])
+    used = sorted({int(table.input_indices[row]) for row in kept})
+    place = {gui: at for at, gui in enumerate(used)}
+    dna.gui_control_names = [template.gui_control_names[gui] for gui in used]
+    dna.gui_to_raw = Conditionals(
+        input_indices=[place[int(table.input_indices[row])] for row in kept],
+        output_indices=[names[led[row]] for row in kept],
+        from_values=np.asarray(table.from_values)[kept],
+        to_values=np.asarray(table.to_values)[kept],
+        slope_values=np.asarray(table.slope_values)[kept],
+        cut_values=np.asarray(table.cut_values)[kept],
+    )
+
+
+def _silent(_line: str) -> None:
+    pass
+
+
+def _at(progress: Progress | None, share: float) -> None:
+    if progress is not None and progress(share) is False:
+        raise Stopped
+
+
+def _part(progress: Progress | None, begin: float, end: float) -> Progress | None:
+    return None if progress is None else lambda share: progress(begin + share * (end - begin))

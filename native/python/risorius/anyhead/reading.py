@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""The meshes of a file that holds a head at rest."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from ..author.geometry.skeleton import Ints
+from ..author.heads.parts import HeadPart, taken_apart
+from ..author.input import fbx, gltf
+from ..author.input.fbx_head import read_fbx_head
+from ..author.input.gltf_head import read_gltf_head
+from ..author.input.mtl import with_materials
+from ..author.input.obj import read_obj
+from ..author.input.spec import BY_BLENDER
+from ..author.input.welding import welded
+from ..base.reading import MESH, read_file
+from .errors import AnyHeadError
+
+
+def read_head(path: Path) -> tuple[list[HeadPart], str]:
+    """The meshes of a head in one space, and the unit of the format, "cm" or "m".
+
+    Args:
+        path: an OBJ, glTF, GLB or FBX file, or a folder of OBJ files, one for each mesh.
+
+    Raises:
+        AnyHeadError: another kind of file, or a folder without OBJ files.
+        ShapeFileError: a file that cannot be used.
+        AnimationFileError: a file that is damaged.
+        OSError: a file cannot be read.
+    """
+    if path.is_dir():
+        files = sorted(path.glob("*.obj"))
+        if not files:
+            raise AnyHeadError(f"{path}: a folder with OBJ files was expected, found none")
+        return [part for file in files for part in _obj_parts(file)], "cm"
+    suffix = path.suffix.lower()
+    if suffix in gltf.SUFFIXES:
+        return read_gltf_head(path), "m"
+    if suffix == fbx.SUFFIX:
+        return read_fbx_head(path), "m"
+    if suffix in BY_BLENDER:
+        raise AnyHeadError(
+            f"{path}: OBJ, glTF, GLB or FBX was expected, found {suffix}: import it into Blender "
+            "and choose Object > Make Rig from Head, or save it there as glTF"
+        )
+    return _obj_parts(path), "cm"
+
+
+def _obj_parts(path: Path) -> list[HeadPart]:
+    """The objects of an OBJ file; of one without objects, its islands by their materials."""
+    mesh = read_obj(path)
+    names, of_face = _objects(path)
+    if len(names) < 2 or len(of_face) != len(mesh.faces):
+        whole = with_materials(path, HeadPart(path.stem, mesh, source=path.stem))
+        return [_welded(part) for part in whole]
+    parts = taken_apart(HeadPart(path.stem, mesh, source=path.stem), names, of_face)
+    for part in parts:
+        part.source, part.polygons = part.name, None
+    return [_welded(part) for part in parts]
+
+
+def _welded(part: HeadPart) -> HeadPart:
+    part.mesh, _ = welded(part.mesh, [])
+    return part
+
+
+def _objects(path: Path) -> tuple[list[str], Ints]:
+    """The names of a file's objects, each once, and which of them each polygon belongs to."""
+    names: dict[str, int] = {}
+    rows, own = [], ""
+    data = io.BytesIO(read_file(path, MESH, found=True))
+    for line in io.TextIOWrapper(data, encoding="utf-8", errors="replace"):
+        kind, _, rest = line.strip().partition(" ")
+        if kind == "o":
+            own = rest.strip() or path.stem
+        elif kind == "f":
+            rows.append(names.setdefault(own or path.stem, len(names)))
+    return list(names), np.array(rows, np.int64)

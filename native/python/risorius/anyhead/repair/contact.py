@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: MIT
+"""Skin that is kept out of teeth and gums, and skin that is torn."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ..._native import ClosestPoints, SkinChecker, SkinFaults
+from ...author.geometry.skeleton import Doubles, Ints
+from ..fittings.fitted import Bodies
+from ..surface import Surface
+from .report import MM
+
+_NEAR = 0.8  # cm from teeth: skin that may come into them
+_DEEP = 0.01  # cm: what is less deep is left alone
+_INSIDE = 0.4  # cm: what seems to be deeper in lies behind
+_STRETCH = 2.5  # times its area, as SkinChecker counts it
+LEAST = 0.5  # mm3 that are left alone
+_AWAY = 1e4  # cm: solids that are there touch nothing
+_ROUNDS = 4
+_MOVED = 1e-4  # cm: what moves less rests
+_AROUND = 15.0  # cm: what is further hides nothing
+_WAYS = 3  # of fifteen, along which what is seen is seen
+_SHORT = 0.2  # cm: what hangs on a longer edge is not beside what is seen
+_RIM = 2  # rings of vertices beside what is seen
+_MANY = 60_000  # vertices of a skin from which on the soft way is not tried
+Mask = npt.NDArray[np.bool_]
+
+
+class Contacts:
+    """The skin of a target against its teeth and gums."""
+
+    def __init__(self, skin: Surface, faces: Sequence[Sequence[int]], bodies: Bodies) -> None:
+        """Begins.
+
+        Args:
+            skin: at rest.
+            faces: polygons of the skin.
+            bodies: teeth and gums.
+        """
+        self.skin, self.bodies = skin, bodies
+        sizes = np.array([len(face) for face in faces], np.int64)
+        self._offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.uint32)
+        self._corners = np.concatenate([np.asarray(face, np.int64) for face in faces])
+        of_triangle = np.repeat(np.arange(len(faces)), np.maximum(sizes - 2, 0))
+        self._face_of = of_triangle if len(of_triangle) == len(skin.triangles) else None
+        self._area = self._areas(skin.points, np.arange(len(skin.triangles)))
+        self._checker: SkinChecker | None = None
+        self._rest: SkinFaults | None = None
+        self._near = self._near_teeth()
+        self._rest_depth = self._depth(skin.points[self._near], bodies.rest)
+        area = np.zeros(len(skin.points))
+        of_triangle = np.linalg.norm(skin.face_normals(), axis=1) / 6
+        for k in range(3):
+            area += np.bincount(skin.triangles[:, k], of_triangle, len(area))
+        self._share = area[self._near]  # cm2 of each vertex
+
+    def stretched(self, displacement: Doubles) -> int:
+        """How many polygons have more than 2.5 times their area.
+
+        Args:
+            displacement: float64[V, 3].
+        """
+        moved = np.abs(displacement).max(axis=1) > _MOVED
+        own = np.flatnonzero(moved[self.skin.triangles].any(axis=1))
+        if self._face_of is not None:  # all of a polygon
+            polygons = np.zeros(len(self._area), bool)
+            polygons[self._face_of[own]] = True
+            own = np.flatnonzero(polygons[self._face_of])
+        areas = self._areas(self.skin.points + displacement, own)
+        return int((areas > _STRETCH * np.maximum(self._area, 1e-12)).sum())
+
+    def volume(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
+        """mm3 of skin in teeth and gums, beyond rest: depth times area, as SkinChecker counts it.
+
+        Args:
+            displacement: float64[V, 3].
+            controls: raw controls that are 1.
+        """
+        if not len(self._near):
+            return 0.0
+        own = displacement[self._near]
+        posed = self.bodies.posed(controls)
+        if posed is self.bodies.rest and np.abs(own).max(initial=0.0) < _DEEP:
+            return 0.0
+        depth = self._depth(self.skin.points[self._near] + own, posed)
+        beyond = np.maximum(depth - self._rest_depth - _DEEP, 0.0)
+        return float(beyond @ self._share) * MM**3
+
+    def pushed(self, displacement: Doubles, controls: tuple[str, ...]) -> Doubles:
+        """float64[V, 3]: an expression with less skin in teeth and gums, pushed out softly.
+
+        Args:
+            displacement: float64[V, 3].
+            controls: raw controls that are 1.
+        """
+        posed = self.bodies.posed(controls)
+        if len(self.skin.points) > _MANY:
+            return self._lifted(displacement, posed)
+        points = self.skin.points + displacement
+        moved, _, _ = self._made().repair(points, posed, self._allowed(points), [])
+        out = displacement + np.asarray(moved)
+        return self._lifted(out, posed) if self.volume(out, controls) > LEAST else out
+
+    def _lifted(self, displacement: Doubles, posed: list[Doubles]) -> Doubles:
+        """Out along the teeth's normals, with what is around, where the soft way found nothing."""
+        points = self.skin.points + displacement
+        edges = self._edges()
+        for _ in range(_ROUNDS):
+            push = np.zeros_like(points)
+            depth, normal = self._depths(points[self._near], posed)
+            lack = np.maximum(depth - self._rest_depth, 0.0)
+            if lack.max(initial=0.0) < _DEEP:
+                break
+            push[self._near] = lack[:, None] * normal
+            points = points + _spread(push, edges)
+        return np.asarray(points - self.skin.points)
+
+    def _edges(self) -> Ints:
+        near = np.zeros(len(self.skin.points), bool)
+        near[self._near] = True
+        edges = self.skin.edges()
+        return np.asarray(edges[near[edges].all(axis=1)])
+
+    def _made(self) -> SkinChecker:
+        if self._checker is None:
+            solids = [
+                (np.ascontiguousarray(triangles, np.uint32), len(points))
+                for triangles, points in zip(self.bodies.triangles, self.bodies.rest, strict=True)
+            ]
+            self._checker = SkinChecker(
+                self.skin.points, self._offsets, self._corners.astype(np.uint32), solids, MM
+            )
+            self._rest = self._checker.look(self.skin.points, self.bodies.rest)
+        return self._checker
+
+    def _allowed(self, points: Doubles) -> SkinFaults:
+        """What the skin has at rest, and in this pose against itself: lips press on each other."""
+        checker = self._made()
+        assert self._rest is not None
+        away = [solid + _AWAY for solid in self.bodies.rest]
+        itself = checker.look(points, away)
+        depth = np.maximum(np.asarray(self._rest.depth), np.asarray(itself.depth))
+        return SkinFaults(depth, itself.stretch, itself.fold)
+
+    def _areas(self, points: Doubles, own: Ints) -> Doubles:
+        """float64[polygons], twice the area of each as a fan; of those of some triangles alone."""
+        a, b, c = (points[self.skin.triangles[own, k]] for k in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        if self._face_of is None:
+            out = np.zeros(len(self.skin.triangles))
+            out[own] = area
+            return out
+        count = int(self._face_of.max(initial=-1)) + 1
+        return np.asarray(np.bincount(self._face_of[own], area, minlength=count))
+
+    def _near_teeth(self) -> Ints:
+        """int64[n]: vertices near teeth and gums that are seen when the mouth opens: who looks in
+        from the front sees no inside of a cheek."""
+        if not self.bodies.rest:
+            return np.zeros(0, np.int64)
+        points = np.concatenate(self.bodies.rest)
+        low, high = points.min(axis=0) - _NEAR, points.max(axis=0) + _NEAR
+        inside = ((self.skin.points > low) & (self.skin.points < high)).all(axis=1)
+        near = np.flatnonzero(inside)
+        return near[self._seen(near)] if len(near) else near
+
+    def _seen(self, vertices: Ints) -> Mask:
+        """bool[n]: whether a vertex is seen from somewhere in front of the face, or is beside one
+        that is."""
+        points, normals = self.skin.points, self.skin.normals()[vertices]
+        triangles = np.ascontiguousarray(self.skin.triangles, np.int32)
+        tree = ClosestPoints(points, triangles)
+        times = np.zeros(len(points), np.int64)
+        for x, y in itertools.product((-1.0, -0.4, 0.0, 0.4, 1.0), (-0.7, 0.0, 0.7)):
+            way = np.array([x, y, 1.0]) / np.linalg.norm([x, y, 1.0])
+            faces = normals @ way > 0.05
+            begin = points[vertices[faces]] + 0.01 * normals[faces]
+            hit, _, _ = tree.first_hit(begin, np.broadcast_to(way, begin.shape), farthest=_AROUND)
+            times[vertices[faces]] += hit < 0
+        seen = times >= _WAYS  # a slit between lips lets some through
+        edges = self.skin.edges()
+        ends = points[edges[:, 0]] - points[edges[:, 1]]
+        edges = edges[np.linalg.norm(ends, axis=1) < _SHORT]
+        for _ in range(_RIM):
+            beside = edges[seen[edges].any(axis=1)]
+            seen[beside] = True
+        return np.asarray(seen[vertices])
+
+    def _depth(self, points: Doubles, posed: list[Doubles]) -> Doubles:
+        return self._depths(points, posed)[0]
+
+    def _depths(self, points: Doubles, posed: list[Doubles]) -> tuple[Doubles, Doubles]:
+        """float64[n], how deep points are in solids, 0: outside; float64[n, 3], the ways out."""
+        deepest, out = np.zeros(len(points)), np.zeros((len(points), 3))
+        if not len(points):
+            return deepest, out
+        for solid, triangles in zip(posed, self.bodies.triangles, strict=True):
+            tree = ClosestPoints(solid, np.ascontiguousarray(triangles, np.int32))
+            triangle, shares, distance = tree.nearest(points)
+            surface = Surface(solid, triangles)
+            normals = surface.normals()[triangles[triangle]]
+            normal = np.einsum("nk,nkd->nd", shares, normals)
+            normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+            arm = points - surface.at(triangle.astype(np.int64), shares)
+            inside = (np.einsum("nd,nd->n", arm, normal) < 0) & (distance < _INSIDE)
+            deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)
+            deepest[deeper], out[deeper] = distance[deeper], normal[deeper]
+        return deepest, out
+
+
+def _spread(push: Doubles, edges: Ints) -> Doubles:
+    """What is pushed, and softly less around it."""
+    a, b = edges.T
+    count = np.maximum(np.bincount(a, minlength=len(push)) + np.bincount(b, minlength=len(push)), 1)
+    need, out = np.linalg.norm(push, axis=1), push.copy()
+    for _ in range(5):
+        total = np.stack(
+            [
+                np.bincount(a, out[b, k], len(push)) + np.bincount(b, out[a, k], len(push))
+                for k in range(3)
+            ],
+            axis=1,
+        )
+        out = np.where(need[:, None] > 0, push, total / count[:, None])
+    return out

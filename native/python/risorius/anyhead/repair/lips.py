@@ -1,0 +1,312 @@
+# SPDX-License-Identifier: MIT
+"""Lips that meet along their line where the mouth is to be closed, and do not cut each other.
+
+Space cannot tell upper from lower lip where they touch: what opens the jaw can. So the lips of a
+mesh of any topology are known by the expressions that it was given.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..._native import ClosestPoints
+from ...author.geometry.skeleton import Doubles, Ints
+from ...base.easing import smooth_step
+from ..surface import Surface
+
+_ROUND = ("mouthLipsPurse", "mouthFunnel", "mouthPucker")  # what moves lips and little else
+_LIP = 0.25  # of the largest such motion
+_STILL, _TAKEN = 0.35, 0.6  # of the jaw's motion: upper and lower lip
+COLUMNS = 40
+_WIDTH_MM = 50.0  # of a human mouth: lengths below are meant on it
+_RIM = 1.2  # mm beyond the nearest place of a column: the rim
+_FADE = 14.0  # mm from the rim along the skin: what goes none of the way
+_BAND = 2.5  # mm from the rim: what goes all of it
+_CORNER = 0.08  # of the width: a column so near to a corner may be joined skin
+_TOUCH = 0.8  # mm: lips that are nearer touch at rest
+_GOAL = 0.05  # mm between lips that are brought together
+_DEEP = 0.1  # mm that lips may press into each other, where they do no more at rest
+_ROUNDS = 12
+_NEAR = 3.0  # mm: further in there is no sign
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Upper and lower lip in a pose, by column from the right corner to the left one.
+
+    Attributes:
+        gap: float64[COLUMNS], in the target's unit, below 0 where they are in each other; NaN
+            where a column has no lips.
+        way: float64[COLUMNS, 3] of length 1, from the lower to the upper lip.
+    """
+
+    gap: Doubles
+    way: Doubles
+
+
+class Lips:
+    """The lips of a target at rest."""
+
+    def __init__(
+        self,
+        skin: Surface,
+        expressions: Mapping[str, Doubles],
+        corners: Doubles | None = None,
+    ) -> None:
+        """Begins; `found` says whether there are lips that part.
+
+        Args:
+            skin: the target at rest.
+            expressions: float64[V, 3] by raw control; jawOpen among them.
+            corners: float64[2, 3], the right and the left corner of the mouth; None: where the
+                lips that touch at rest end.
+        """
+        self.skin = skin
+        self.found = False
+        upper, lower = _labels(expressions, len(skin.points))
+        if min(len(upper), len(lower)) < 6:
+            return
+        self._upper, self._lower = _of(skin, upper), _of(skin, lower)
+        if not len(self._upper) or not len(self._lower):
+            return
+        both = skin.points[np.concatenate([upper, lower])]
+        ends = both[[both[:, 0].argmin(), both[:, 0].argmax()]] if corners is None else corners
+        self._place(ends, both)
+        if corners is None:
+            touching = self._touching()
+            if touching is None:
+                return
+            self._place(touching, both)
+        rims = [
+            self._rim(a, b) for a, b in ((self._upper, self._lower), (self._lower, self._upper))
+        ]
+        if not all(len(rim) for rim in rims):
+            return
+        self.found = True
+        self.rest = self.meeting(skin.points)
+        self._fades = [self._fade(rim) for rim in rims]
+
+    def _place(self, ends: Doubles, lips: Doubles) -> None:
+        """Columns between two corners of the mouth."""
+        width = float(np.linalg.norm(ends[1] - ends[0]))
+        self.mm = width / _WIDTH_MM
+        middle = ends.mean(axis=0)
+        near = np.abs(lips[:, 0] - middle[0]) < 0.1 * width
+        front = lips[near, 2].max() if near.any() else lips[:, 2].max()
+        self._axis = np.array([middle[0], middle[1], front - 0.7 * width])
+        first, last = np.sort(self._around(ends))
+        inset = _CORNER * (last - first)
+        self._edges = np.linspace(first + inset, last - inset, COLUMNS + 1)
+        self.columns = (self._edges[1:] + self._edges[:-1]) / 2
+
+    def _touching(self) -> Doubles | None:
+        """float64[2, 3]: where the lips that touch at rest end; None where they do not touch."""
+        half, least = COLUMNS // 2, _TOUCH * self.mm / 2  # what funnels is two mouths wide
+        for _ in range(3):  # columns become finer
+            gap = self.meeting(self.skin.points).gap
+            touch = np.nan_to_num(gap, nan=np.inf) < least
+            if not touch[half - 2 : half + 2].any():
+                return None
+            apart = np.flatnonzero(~touch)
+            first = int(apart[apart < half].max(initial=-1)) + 1
+            last = int(apart[apart >= half].min(initial=COLUMNS)) - 1
+            angles = self._edges[[first, last + 1]]
+            points = self.skin.points[np.unique(self._upper)]
+            around = self._around(points)
+            ends = np.array([points[np.abs(around - angle).argmin()] for angle in angles])
+            self._place(ends, points)
+        return ends
+
+    def meeting(self, points: Doubles) -> Meeting:
+        """How the lips lie to each other.
+
+        Args:
+            points: float64[V, 3], of the posed target.
+        """
+        gap, way = np.full(COLUMNS, np.inf), np.zeros((COLUMNS, 3))
+        for sign, own, other in ((1, self._upper, self._lower), (-1, self._lower, self._upper)):
+            samples = _samples(points, own)
+            apart, toward = self._apart(points, samples, other)
+            column = self._column(samples)
+            order = np.argsort(-apart)  # the nearest is written last
+            order = order[(column[order] >= 0) & (apart[order] < gap[column[order]])]
+            gap[column[order]], way[column[order]] = apart[order], sign * toward[order]
+        known = np.isfinite(gap)
+        return Meeting(np.where(known, gap, np.nan), way)
+
+    def welded(self) -> int:
+        """In how many of the COLUMNS one polygon belongs to both lips."""
+        lips = np.zeros(len(self.skin.points), np.int64)
+        lips[np.unique(self._upper)] |= 1
+        lips[np.unique(self._lower)] |= 2
+        corners = lips[self.skin.triangles]
+        both = (corners == 1).any(axis=1) & (corners == 2).any(axis=1)
+        middles = self.skin.points[self.skin.triangles[both]].mean(axis=1)
+        return len(np.unique(self._column(middles))) - 1 if len(middles) else 0
+
+    def widest(self, points: Doubles) -> float:
+        """The widest gap between the lips, in the target's unit.
+
+        Args:
+            points: float64[V, 3], of the posed target.
+        """
+        return float(np.nan_to_num(self.meeting(points).gap).max(initial=0.0))
+
+    def deepest(self, points: Doubles) -> float:
+        """How deep the lips are in each other beyond rest, in the target's unit.
+
+        Args:
+            points: float64[V, 3], of the posed target.
+        """
+        least = np.fmin(np.nan_to_num(self.rest.gap), 0.0)
+        return float(np.nan_to_num(least - self.meeting(points).gap).max(initial=0.0))
+
+    def closed(self, points: Doubles) -> Doubles:
+        """float64[V, 3]: the posed target with lips that meet.
+
+        Args:
+            points: float64[V, 3], of the posed target.
+        """
+        best, least = points, np.inf
+        for _ in range(_ROUNDS + 1):
+            meeting = self.meeting(points)
+            wrong = self._wrong(meeting)
+            cost = float(np.abs(wrong).max())
+            if cost < least:
+                best, least = points, cost
+            if not wrong.any():
+                break
+            by = _even(wrong)[:, None] * _straight(meeting.way, wrong)
+            around = self._around(points)
+            share = np.stack(
+                [np.interp(around, self.columns, by[:, k], left=0, right=0) for k in range(3)], 1
+            )
+            upper, lower = self._fades
+            points = points + share * ((lower - upper) / 2)[:, None]
+        return best
+
+    def _wrong(self, meeting: Meeting) -> Doubles:
+        """float64[COLUMNS]: what lips are to come together by, below 0: go apart by."""
+        gap = np.nan_to_num(meeting.gap)
+        deepest = np.fmin(np.nan_to_num(self.rest.gap), -_DEEP * self.mm)
+        far = np.where(gap > 2 * _GOAL * self.mm, gap - _GOAL * self.mm, 0.0)
+        return far + np.minimum(gap - deepest, 0.0)
+
+    def _around(self, points: Doubles) -> Doubles:
+        """float64[n]: radians about an upright axis behind the mouth."""
+        arm = points - self._axis
+        return np.arctan2(arm[:, 0], arm[:, 2])
+
+    def _column(self, points: Doubles) -> Ints:
+        """int64[n]: the column of each point, -1: none."""
+        at = np.searchsorted(self._edges, self._around(points)) - 1
+        return np.where((at >= 0) & (at < COLUMNS), at, -1)
+
+    def _apart(self, points: Doubles, samples: Doubles, other: Ints) -> tuple[Doubles, Doubles]:
+        """How far samples are from the other lip, below 0: in it; and the ways from it to them."""
+        used, local = np.unique(other, return_inverse=True)
+        surface = Surface(points[used], local.reshape(-1, 3))
+        tree = ClosestPoints(surface.points, np.ascontiguousarray(surface.triangles, np.int32))
+        triangle, shares, distance = tree.nearest(samples)
+        nearest = surface.at(triangle.astype(np.int64), shares)
+        normals = surface.normals()[surface.triangles[triangle]]
+        normal = np.einsum("nk,nkd->nd", shares, normals)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        arm = samples - nearest
+        inside = (np.einsum("nd,nd->n", arm, normal) < 0) & (distance < _NEAR * self.mm)
+        signed = np.where(inside, -distance, distance)
+        close = distance < 1e-6 * self.mm
+        way = arm / np.maximum(distance, 1e-12)[:, None] * np.where(inside, -1, 1)[:, None]
+        return signed, np.where(close[:, None], normal, way)
+
+    def _rim(self, own: Ints, other: Ints) -> Ints:
+        """int64[n]: vertices of a lip that lie nearest to the other one in their column."""
+        points, vertices = self.skin.points, np.unique(own)
+        apart, _ = self._apart(points, points[vertices], other)
+        apart = np.abs(apart)
+        column = self._column(points[vertices])
+        least = np.full(COLUMNS + 1, np.inf)
+        np.minimum.at(least, column, apart)
+        near = (column >= 0) & (apart <= least[column] + _RIM * self.mm)
+        return vertices[near]
+
+    def _fade(self, rim: Ints) -> Doubles:
+        """float64[V]: 1 at a rim, 0 where the skin is far from it."""
+        away = _along(self.skin, rim, _FADE * self.mm) / self.mm
+        return np.asarray(1 - smooth_step((away - _BAND) / (_FADE - _BAND)))
+
+
+def _labels(expressions: Mapping[str, Doubles], count: int) -> tuple[Ints, Ints]:
+    """int64[n]: vertices of the upper and of the lower lip."""
+    none = np.zeros(0, np.int64)
+    strength, jaw = np.zeros(count), expressions.get("jawOpen")
+    for name, delta in expressions.items():
+        if name.startswith(_ROUND):
+            strength += np.linalg.norm(delta, axis=1)
+    if jaw is None or not strength.any():
+        return none, none
+    lips = np.flatnonzero(strength > _LIP * strength.max())
+    travel = np.linalg.norm(jaw, axis=1)[lips]
+    whole = np.quantile(travel, 0.9)
+    if not whole > 0:
+        return none, none
+    return lips[travel < _STILL * whole], lips[travel > _TAKEN * whole]
+
+
+def _of(skin: Surface, vertices: Ints) -> Ints:
+    """int64[T, 3]: the triangles of vertices."""
+    own = np.zeros(len(skin.points), bool)
+    own[vertices] = True
+    return np.asarray(skin.triangles[own[skin.triangles].all(axis=1)], np.int64)
+
+
+def _samples(points: Doubles, triangles: Ints) -> Doubles:
+    """float64[n, 3]: corners, middles of sides and of triangles."""
+    corners = points[triangles]
+    sides = (corners + np.roll(corners, 1, axis=1)) / 2
+    return np.concatenate([corners.reshape(-1, 3), sides.reshape(-1, 3), corners.mean(axis=1)])
+
+
+def _along(skin: Surface, begin: Ints, farthest: float) -> Doubles:
+    """float64[V]: how far vertices are along edges, at most `farthest`."""
+    out = np.full(len(skin.points), farthest)
+    near = np.linalg.norm(skin.points - skin.points[begin].mean(axis=0), axis=1)
+    reach = near[begin].max() + farthest
+    edges = skin.edges()
+    edges = edges[(near[edges] <= reach).all(axis=1)]
+    length = np.linalg.norm(skin.points[edges[:, 0]] - skin.points[edges[:, 1]], axis=1)
+    beside: dict[int, list[tuple[int, float]]] = {}
+    for (a, b), size in zip(edges.tolist(), length.tolist(), strict=True):
+        beside.setdefault(a, []).append((b, size))
+        beside.setdefault(b, []).append((a, size))
+    out[begin] = 0.0
+    heap = [(0.0, int(v)) for v in begin]
+    heapq.heapify(heap)
+    while heap:
+        away, vertex = heapq.heappop(heap)
+        if away > out[vertex]:
+            continue
+        for other, size in beside.get(vertex, ()):
+            if away + size < out[other]:
+                out[other] = away + size
+                heapq.heappush(heap, (away + size, other))
+    return out
+
+
+def _straight(ways: Doubles, weights: Doubles) -> Doubles:
+    """float64[COLUMNS, 3] of length 1: each way as its neighbours go, by what is wrong there."""
+    out = np.abs(weights)[:, None] * ways
+    for _ in range(2):
+        wide = np.pad(out, ((1, 1), (0, 0)), mode="edge")
+        out = (wide[:-2] + 2 * wide[1:-1] + wide[2:]) / 4
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    return np.where(length > 1e-12, out / np.maximum(length, 1e-12), [0.0, 1.0, 0.0])
+
+
+def _even(values: Doubles) -> Doubles:
+    wide = np.pad(values, 1, mode="edge")
+    return np.asarray((wide[:-2] + 2 * wide[1:-1] + wide[2:]) / 4)

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""Expressions of a target repaired one after the other, and what is wrong before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ...author.geometry.skeleton import Doubles
+from ..errors import Stopped
+from ..eyes.eyelids import Eyelids, find_eyelids
+from ..fittings.fitted import Bodies, Fittings, eye_turn_of
+from ..surface import Surface
+from .contact import LEAST, Contacts
+from .lips import COLUMNS, Lips
+from .report import MM, Faults, Report
+
+Pose = tuple[str, ...]
+Progress = Callable[[float], bool | None]
+_BLINK, _OPEN = "eyeBlink", "jawOpen"
+_CLOSE = ("mouthLipsTogether", "mouthClose")  # what closes the mouth of an open jaw
+_WELDED = 2  # columns of the mouth: near its corners lips are one
+_CUT = 0.002  # cm of lids in the eye that are left alone
+
+
+class Places(Protocol):
+    """Landmarks by name, as far as repair needs them."""
+
+    @property
+    def points(self) -> Mapping[str, Doubles]:
+        """float64[3] by name."""
+
+
+@dataclass
+class Repaired:
+    """What repair makes.
+
+    Attributes:
+        expressions: float64[V, 3] by raw control.
+        combinations: float64[V, 3] by the controls that are 1 together, all of the way.
+        report: what was wrong, and what is left.
+    """
+
+    expressions: dict[str, Doubles]
+    combinations: dict[Pose, Doubles]
+    report: Report
+
+
+def repair(
+    target: Surface,
+    faces: Sequence[Sequence[int]],
+    parts: Fittings,
+    landmarks: Places | None,
+    registered: object,
+    expressions: Mapping[str, Doubles],
+    combinations: Mapping[Pose, Doubles],
+    progress: Progress | None = None,
+) -> Repaired:
+    """Expressions whose lids close on this eye, whose lips meet, without skin in eyes and teeth.
+
+    Args:
+        target: the skin at rest, cm, standing.
+        faces: its polygons.
+        parts: eyes, teeth and the like.
+        landmarks: corners of the mouth are used; None: they are sought.
+        registered: how the template lies on the target; not needed by what is repaired here.
+        expressions: float64[V, 3] by raw control.
+        combinations: float64[V, 3] by the controls that are 1 together, all of the way.
+        progress: told the share that is done, 0 to 1; False stops.
+
+    Raises:
+        Stopped: progress said False.
+    """
+    del registered
+    closing = _closing(expressions, combinations)
+    work = _Repair(target, faces, parts, landmarks, expressions, closing)
+    singles: dict[str, Doubles] = {}
+    jobs = len(expressions) + len(combinations) + 1
+    for number, (name, way) in enumerate(expressions.items()):
+        singles[name] = work.repaired((name,), np.asarray(way, np.float64))
+        if progress is not None and progress(number / jobs) is False:
+            raise Stopped
+    together = dict(combinations)
+    if closing and not any(set(pose) == set(closing) for pose in together):
+        together[closing] = _together(closing, expressions, combinations)
+    out: dict[Pose, Doubles] = {}
+    for number, (pose, way) in enumerate(together.items(), len(expressions)):
+        changes = [singles[c] - expressions[c] for c in pose if c in singles]
+        out[pose] = work.repaired(pose, np.asarray(way, np.float64) + sum(changes, np.zeros(1)))
+        if progress is not None and progress(number / jobs) is False:
+            raise Stopped
+    return Repaired(singles, out, work.report)
+
+
+def _closing(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:
+    """The open jaw with closed lips; empty where the face has no such controls."""
+    names = dict.fromkeys([*expressions, *(name for pose in combinations for name in pose)])
+    lips = [name for name in names if name.startswith(_CLOSE)]
+    return (_OPEN, *lips) if lips and _OPEN in expressions else ()
+
+
+def _together(
+    pose: Pose, expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]
+) -> Doubles:
+    """float64[V, 3] of a pose by what its controls do alone and in pairs."""
+
+    def alone(name: str) -> Doubles:
+        return np.asarray(expressions.get(name, 0.0), np.float64)
+
+    out = sum((alone(name) for name in pose), np.zeros(1))
+    for pair, way in combinations.items():
+        if len(pair) == 2 and set(pair) <= set(pose):
+            out = out + way - alone(pair[0]) - alone(pair[1])
+    return np.asarray(out)
+
+
+def _closes_eye(pose: Pose, side: str) -> bool:
+    return _BLINK + side in pose
+
+
+class _Repair:
+    def __init__(
+        self,
+        target: Surface,
+        faces: Sequence[Sequence[int]],
+        parts: Fittings,
+        landmarks: Places | None,
+        expressions: Mapping[str, Doubles],
+        closing: Pose,
+    ) -> None:
+        self.report = Report()
+        self.target = target
+        self.eyelids: dict[str, Eyelids] = {}
+        for side, ball in parts.eyes.items():
+            lids = find_eyelids(target, ball)
+            if lids is not None:
+                self.eyelids[side] = lids
+                continue
+            word = "left" if side == "L" else "right"
+            self.report.notes.append(f"the {word} eye is not seen between lids: they stay as they "
+                                     "are")  # fmt: skip
+        self.lips = Lips(target, expressions, _corners(landmarks))
+        self.lip_controls = closing
+        if not self.lips.found and self.lip_controls:
+            self.report.notes.append("no lips that part were found: they stay as they are")
+        welded = self.lips.welded() if self.lips.found else 0
+        if welded > _WELDED:
+            self.report.notes.append(f"the lips are one skin in {welded / COLUMNS:.0%} of the "
+                                     "mouth: they do not part there")  # fmt: skip
+        self.bodies = Bodies(parts, target, expressions)
+        self.contacts = Contacts(target, faces, self.bodies)
+
+    def repaired(self, pose: Pose, way: Doubles) -> Doubles:
+        """float64[V, 3] of a pose; its faults go into the report."""
+        if not way.any():
+            return way
+        before = self.faults(pose, way)
+        out = self._at_eyes(pose, way)
+        if self._closes_mouth(pose):
+            out = self.lips.closed(self.target.points + out) - self.target.points
+        if before.volume > LEAST:
+            pushed = self.contacts.pushed(out, pose)
+            if self._closes_mouth(pose):
+                pushed = self.lips.closed(self.target.points + pushed) - self.target.points
+            out = pushed
+        changed = out is not way and bool(np.abs(out - way).max(initial=0.0) > 0)
+        after = self.faults(pose, out) if changed else before
+        if before != Faults() or after != Faults() or self._closes(pose):
+            self.report.rows["+".join(pose)] = before, after
+        return out
+
+    def faults(self, pose: Pose, way: Doubles) -> Faults:
+        """What is wrong with a pose."""
+        gap = cut = 0.0
+        for side, lids in self.eyelids.items():
+            turn = eye_turn_of(side, pose)
+            if turn is None and not lids.moves(way):
+                continue
+            if _closes_eye(pose, side):
+                gap = max(gap, lids.gap(way, turn))
+            cut = max(cut, lids.cut(way, turn))
+        lip_gap = lip_cut = 0.0
+        if self._closes_mouth(pose):
+            points = self.target.points + way
+            lip_gap, lip_cut = self.lips.widest(points), self.lips.deepest(points)
+        volume = self.contacts.volume(way, pose)
+        stretched = self.contacts.stretched(way)
+        return Faults(gap * MM, cut * MM, lip_gap * MM, lip_cut * MM, volume, stretched)
+
+    def _at_eyes(self, pose: Pose, way: Doubles) -> Doubles:
+        out = way
+        for side, lids in self.eyelids.items():
+            turn = eye_turn_of(side, pose)
+            if _closes_eye(pose, side):
+                out = lids.closed(out, turn)
+            elif (turn is not None or lids.moves(out)) and lids.cut(out, turn) > _CUT:
+                out = lids.lifted(out, turn)
+        return out
+
+    def _closes_mouth(self, pose: Pose) -> bool:
+        return self.lips.found and bool(self.lip_controls) and set(self.lip_controls) <= set(pose)
+
+    def _closes(self, pose: Pose) -> bool:
+        return self._closes_mouth(pose) or any(_closes_eye(pose, side) for side in self.eyelids)
+
+
+def _corners(landmarks: Places | None) -> Doubles | None:
+    if landmarks is None:
+        return None
+    found = [landmarks.points.get(f"mouth_corner_{side}") for side in "RL"]
+    if any(place is None for place in found):
+        return None
+    return np.array(found, np.float64)

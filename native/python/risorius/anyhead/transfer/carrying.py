@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""What an expression does at each vertex of the template, as this head's form has it.
+
+The change of form says how far a motion goes here and which way. What the jaw takes along turns
+with it by the same angle on everybody, about a hinge that lies where this head's is; only what is
+left of the motion follows the form.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...author.geometry.rigid import rigid_way
+from ...author.geometry.skeleton import Doubles
+from .form import changes_of_form
+from .template import Pose, TemplateFace, left_over
+
+_REST = 0.05  # cm: where the jaw moves a place less than that, it does not carry it
+_FLESH = 0.1  # of a size: by so much flesh makes a jaw larger or smaller whose bone is the same
+_SPURIOUS = 0.002  # cm: a corrective ends where the template's does
+
+
+class Carrying:
+    """From a template to the same vertices on another head."""
+
+    def __init__(self, face: TemplateFace, points: Doubles, trust: Doubles) -> None:
+        """Compares the two.
+
+        Args:
+            face: the template.
+            points: float64[V, 3], its vertices on the other head, cm.
+            trust: float64[V], 0 to 1: how sure the place of each is.
+        """
+        self._face, self._points = face, points
+        self._form = changes_of_form(face.surface, points, trust)
+        if face.jaw is not None:
+            self._place_jaw(trust)
+
+    def _place_jaw(self, trust: Doubles) -> None:
+        """The hinge on the other head, and how large its jaw is, from the form of what it moves."""
+        face = self._face
+        assert face.jaw is not None
+        opening = face.ways.get(("jawOpen",))
+        weight = np.ones(len(trust)) if opening is None else np.linalg.norm(opening, axis=1)
+        weight = weight.astype(np.float64) * (trust + 1e-3)
+        weight /= weight.sum()
+        form = np.einsum("v,vij->ij", weight, self._form)
+        grown = float(np.log(np.cbrt(max(np.linalg.det(form), 1e-3))))
+        # Heads of one bone have more or less flesh about it: small differences are such.
+        self._size = float(np.exp(grown * grown**2 / (grown**2 + _FLESH**2)))
+        middle, other = weight @ face.surface.points, weight @ self._points
+        self._hinge = other + self._size * (face.jaw.hinge - middle)
+
+    def ways(self, strength: float = 1.0) -> dict[Pose, Doubles]:
+        """float64[V, 3] by pose, of what each control does alone, and of what is left over where
+        the controls of a corrective meet.
+
+        Args:
+            strength: what expressions are multiplied with; 1 is the template's own.
+        """
+        face = self._face
+        whole = {pose: self.carried(pose) for pose in face.ways}
+        own, other = left_over(face.ways), left_over(whole)
+        out: dict[Pose, Doubles] = {
+            pose: strength * way for pose, way in whole.items() if len(pose) == 1
+        }
+        for pose, way in other.items():
+            there = np.linalg.norm(own[pose], axis=1, keepdims=True)
+            # Two controls at a share of 1 fire their corrective by the square of it.
+            out[pose] = strength**2 * way * (there / (there + _SPURIOUS))
+        return out
+
+    def carried(self, pose: Pose) -> Doubles:
+        """float64[V, 3]: the way of all controls of a pose together.
+
+        Args:
+            pose: one of the template.
+        """
+        way = self._face.ways[pose].astype(np.float64)
+        jaw = self._face.jaw
+        if jaw is None or pose not in jaw.turns:
+            return np.asarray(np.einsum("vij,vj->vi", self._form, way))
+        turn, shift = jaw.turns[pose]
+        own = rigid_way(self._face.surface.points, jaw.hinge, turn, shift)
+        other = rigid_way(self._points, self._hinge, turn, self._size * shift)
+        length = np.einsum("vi,vi->v", own, own) + _REST**2
+        share = np.clip(np.einsum("vi,vi->v", way, own) / length, 0, 1)[:, None]
+        return np.asarray(np.einsum("vij,vj->vi", self._form, way - share * own) + share * other)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""How a place of one surface is shaped on another of the same triangles: a matrix at each vertex.
+
+It is the change of form of Sumner and Popovic ("Deformation Transfer for Triangle Meshes", 2004),
+taken at vertices and evened out over some centimetres: what a lip's edge or a pore does to a
+triangle says nothing of how far a mouth opens.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...author.geometry.skeleton import Doubles
+from ..surface import Surface
+from .smoothing import Smoothing, areas
+
+EVENED = 2.0  # cm, over which changes of form are evened out
+_UNSURE = 0.3  # how much a place counts that registration carried along with others
+_STEADY = 1e-6  # of a form's size: what a flat place says nothing about stays as it is
+
+
+def changes_of_form(before: Surface, after: Doubles, trust: Doubles) -> Doubles:
+    """float64[V, 3, 3]: what makes a small vector at a vertex of `before` that of `after`.
+
+    Args:
+        before: a surface in cm.
+        after: float64[V, 3], its vertices on another head.
+        trust: float64[V], 0 to 1: how much each vertex of `after` is to count.
+    """
+    mixed, own = _sums(before, after)
+    share = np.maximum(trust, _UNSURE)[:, None]
+    sums = np.concatenate([mixed.reshape(-1, 9) * share, own.reshape(-1, 9) * share], axis=1)
+    even = Smoothing(before).solver(areas(before), EVENED / np.sqrt(2)).solve(sums)
+    mixed, own = even[:, :9].reshape(-1, 3, 3), even[:, 9:].reshape(-1, 3, 3)
+    scale = np.maximum(np.trace(own, axis1=1, axis2=2), 1e-30)[:, None, None]
+    steady = _STEADY * scale * np.eye(3)
+    turned = np.linalg.solve(own + steady, np.swapaxes(mixed + steady, 1, 2))
+    return np.asarray(np.swapaxes(turned, 1, 2))
+
+
+def _sums(before: Surface, after: Doubles) -> tuple[Doubles, Doubles]:
+    """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges a -> b about a vertex, and
+    over its normal as long as an edge."""
+    count = len(before.points)
+    edges = before.edges()
+    a = before.points[edges[:, 1]] - before.points[edges[:, 0]]
+    b = after[edges[:, 1]] - after[edges[:, 0]]
+    mixed, own = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
+    for row in range(3):
+        for column in range(3):
+            for end in (0, 1):
+                at = edges[:, end]
+                mixed[:, row, column] += np.bincount(at, b[:, row] * a[:, column], count)
+                own[:, row, column] += np.bincount(at, a[:, row] * a[:, column], count)
+    normals = [s.normals() for s in (before, Surface(after, before.triangles))]
+    square = np.trace(own, axis1=1, axis2=2)
+    grown = np.trace(mixed, axis1=1, axis2=2).clip(0) / np.maximum(square, 1e-30)
+    mixed += (square * grown)[:, None, None] / 2 * normals[1][:, :, None] * normals[0][:, None, :]
+    own += square[:, None, None] / 2 * normals[0][:, :, None] * normals[0][:, None, :]
+    return mixed, own

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: MIT
+"""risorius author --conform: a DNA file's own topology takes the form of a head."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ... import Dna
+from ...anyhead.conform import Conformed, conform_face
+from ...anyhead.conform.head import mm_of, parts_of
+from ...anyhead.conform.parts import skin_of
+from ...anyhead.landmarks.marks import landmarks_path, read_landmarks
+from ...anyhead.reading import read_head
+from ...author.heads.parts import HeadPart, Wishes
+from ...base.words import counted
+from ...files import fileio
+from ...mixing.mix import Mix
+from ...mixing.regions import Masks
+from ...mixing.textures import mix_textures, texture_folder
+from ..files import CommandLineError, read, refuse_same_file
+
+# Options of `risorius author` that say what a rig is to be, which a face has already.
+_NOT_ITS = (
+    "names", "joints_only", "exact", "tolerance", "bound", "correctives", "report", "onto",
+    "strength", "no_repair", "write_landmarks", "rig",
+)  # fmt: skip
+
+
+class Clock(Protocol):
+    """Says what is done now, and how far it is."""
+
+    def line(self, text: str) -> None: ...
+    def __call__(self, share: float) -> None: ...
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The option --conform.
+
+    Args:
+        parser: of `risorius author`.
+    """
+    parser.add_argument(
+        "--conform",
+        type=Path,
+        metavar="HEAD",
+        help="give the face that is named, a DNA file, the form of this head (OBJ, glTF, FBX, a "
+        "folder of OBJ files, another DNA file; a sculpt of the face as it is): its names, counts "
+        "and layers stay",
+    )
+
+
+def run(args: argparse.Namespace, clock: Clock) -> int:
+    """risorius author --conform HEAD FACE.dna -o OUT.dna
+
+    Args:
+        args: of `risorius author`.
+        clock: told the steps.
+
+    Raises:
+        CommandLineError: options that do not go together.
+        RisoriusError: the face, the head or landmarks cannot be used.
+        OSError: a file cannot be read or written.
+    """
+    _check(args)
+    fileio.check_writable(args.out)
+    refuse_same_file(str(args.spec), str(args.out))
+    dna = read(str(args.spec), "dna")
+    parts, unit = _head(args.conform)
+    marks, known = None, args.landmarks or landmarks_path(args.conform)
+    if args.landmarks is not None or known.is_file():
+        clock.line(f"landmarks of {known}")
+        marks = read_landmarks(known)
+    wishes = Wishes(height_mm=args.height_mm or 0.0, scale=args.scale or 0.0)
+    clock.line(f"{args.spec.name} takes the form of {args.conform.name}")
+    made = conform_face(
+        dna,
+        parts,
+        marks,
+        clock,
+        where=str(args.conform),
+        unit=unit,
+        wishes=wishes,
+        threads=args.threads,
+    )
+    pictures, _ = mix_textures([dna], [args.spec], Mix([1.0]), Masks(dna))
+    folder = texture_folder(args.out)
+    data = made.dna.to_bytes(f"2.{min(max(dna.version, 1), 8)}")
+    fileio.write_all({args.out: data} | {folder / n: own for n, own in pictures.items()})
+    if args.json:
+        print(json.dumps(as_json(dna, made)))
+    else:
+        print("\n".join([*(f"note: {note}" for note in made.notes), as_line(args.out, dna, made)]))
+    return 0
+
+
+def _head(path: Path) -> tuple[list[HeadPart], str]:
+    """The meshes of a head and the unit of its format; another face is a head too."""
+    if path.suffix.lower() != ".dna":
+        return read_head(path)
+    other = read(str(path), "dna")
+    return parts_of(other), other.translation_unit
+
+
+def _check(args: argparse.Namespace) -> None:
+    for name in _NOT_ITS:
+        if getattr(args, name, None) not in (None, False):
+            said = name.replace("_", "-")
+            raise CommandLineError(f"author: --conform takes no --{said}: the face has its rig")
+    if args.spec is None:
+        raise CommandLineError("author: --conform HEAD FACE.dna was expected, found no FACE.dna")
+    if args.out is None:
+        raise CommandLineError("author: -o OUT.dna was expected")
+
+
+def _moved_mm(dna: Dna, made: Conformed) -> tuple[float, float]:
+    """How far the skin's vertices moved from their middle: mean and largest, mm."""
+    before = np.asarray(dna.meshes[skin_of(dna)].positions, np.float64)
+    way = made.moved - made.moved.mean(axis=0) - before + before.mean(axis=0)
+    far = mm_of(dna) * np.linalg.norm(way, axis=1)
+    return float(far.mean()), float(far.max())
+
+
+def as_json(dna: Dna, made: Conformed) -> dict[str, object]:
+    """What became of the face, for a program.
+
+    Args:
+        dna: the face before.
+        made: after.
+    """
+    mean, largest = _moved_mm(dna, made)
+    return {
+        "registered": not made.sculpted,
+        "sculpted": made.sculpted,
+        "moved_mean_mm": mean,
+        "moved_largest_mm": largest,
+        "notes": made.notes,
+    }
+
+
+def as_line(path: Path, dna: Dna, made: Conformed) -> str:
+    """What became of the face.
+
+    Args:
+        path: where it was written.
+        dna: the face before.
+        made: after.
+    """
+    mean, largest = _moved_mm(dna, made)
+    return (
+        f"{path}: {counted(len(dna.joint_names), 'joint')} and {counted(len(dna.meshes), 'mesh')} "
+        f"in the form of the head, which differs from the face by {mean:.1f} mm in the mean and "
+        f"{largest:.1f} at most"
+    )

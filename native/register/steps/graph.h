@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The vertices of a template as a graph, and few nodes of it that stand for all.
+#pragma once
+
+#include <span>
+#include <utility>
+
+#include "register/matching/types.h"
+
+namespace risorius::registering::steps {
+
+/// The neighbours of each vertex, without those of coinciding or unused vertices.
+class Graph {
+ public:
+  Graph(std::size_t vertices, const std::vector<Triangle>& triangles);
+  std::size_t size() const { return begin_.size() - 1; }
+  std::span<const std::uint32_t> of(std::size_t v) const {
+    return {next_.data() + begin_[v], begin_[v + 1] - begin_[v]};
+  }
+
+ private:
+  std::vector<std::size_t> begin_;
+  std::vector<std::uint32_t> next_;
+};
+
+/// Nodes spread over a surface, denser where its vertices are denser.
+struct Nodes {
+  std::vector<std::uint32_t> vertices;  // [N]
+  std::vector<std::uint32_t> cell;      // [V] the node that is nearest along the surface
+  std::vector<std::array<std::uint32_t, 2>> edges;  // nodes whose cells touch
+  /// [V] nodes that carry a vertex, with shares of sum 1
+  std::vector<std::vector<std::pair<std::uint32_t, float>>> carriers;
+};
+
+/// In: count  of nodes; every piece of the surface gets one at least
+Nodes spread(const Graph& graph, const Points& points, std::size_t count);
+
+}  // namespace risorius::registering::steps

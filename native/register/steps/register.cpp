@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: MIT
+#include "register/register.h"
+
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "register/steps/coarse.h"
+#include "register/steps/fine.h"
+#include "register/steps/mirroring.h"
+#include "register/steps/prepare.h"
+
+namespace risorius::registering {
+
+using core::ErrorCode;
+using core::fail;
+using steps::Points;
+
+namespace {
+
+/// Steps of the coarse part: stiffness of the nodes, weight of a pair, how features count.
+struct CoarseStep {
+  double stiffness, landmarks;
+  int rounds;
+  steps::Counting counting;
+};
+constexpr std::array<CoarseStep, 8> kCoarse{{
+    {300, 10, 3, {30, 150, 60, 0.7, false}},
+    {100, 5, 4, {30, 150, 50, 0.5, true}},
+    {30, 2, 4, {30, 150, 40, 0.4, true}},
+    {10, 1, 4, {30, 120, 30, 0.3, true}},
+    {3, 0.3, 4, {20, 80, 20, 0.2, true}},
+    {1, 0.1, 4, {20, 60, 15, 0.2, true}},
+    {0.3, 0.05, 4, {20, 40, 10, 0.1, true}},
+    {0.1, 0.03, 4, {20, 30, 10, 0.1, true}},
+}};
+
+/// Steps of the fine part: stiffness, how far matches may lie, at which distance they count little.
+struct FineStep {
+  double stiffness, farthest, robust, along;
+  int rounds;
+};
+constexpr std::array<FineStep, 6> kFine{{
+    {100, 10, 4, 0.1, 2},
+    {30, 8, 3, 0.1, 2},
+    {10, 6, 2, 0.1, 2},
+    {3, 5, 2, 0.1, 2},
+    {0.5, 4, 2, 0.1, 2},
+    {0.05, 4, 2, 0.1, 3},
+}};
+
+constexpr double kLeastCosine = 0.4;  // of the normals of a match by distance
+constexpr double kFound = 0.5;        // mm from the target at which a vertex is no longer on it
+constexpr double kNoise = 2.0;        // mm, of pairs
+constexpr double kSurest = 25.0;      // times the weight, for pairs without an error
+constexpr double kPrepared = 0.15;    // of the whole work
+constexpr double kCoarsely = 0.65;
+
+core::Unexpected stopped() { return fail(ErrorCode::kInvalidArgument, "", "stopped"); }
+
+/// The work itself: everything is in millimetres.
+class Laying {
+ public:
+  Laying(const Mesh& templ, const steps::Target& target, const steps::Looks& looks,
+         std::vector<steps::Landmark> landmarks, const RegisterOptions& options,
+         const Progress& progress)
+      : templ_(templ),
+        graph_(templ.points.size(), templ.triangles),
+        landmarks_(std::move(landmarks)),
+        matcher_(target, looks, options.threads),
+        options_(options),
+        progress_(progress) {}
+
+  core::Result<Points> coarse(const Points& start) const;
+  core::Result<Points> fine(const Points& base) const;
+  steps::Matcher const& matcher() const { return matcher_; }
+
+ private:
+  void mirror(const Points& points, bool missing, std::vector<steps::Match>& matches) const {
+    if (options_.mirrored.empty() || options_.symmetry <= 0) return;
+    steps::add_mirrored(options_.mirrored, points, options_.symmetry, missing, matches);
+  }
+  bool go_on(double done) const { return !progress_ || progress_(done); }
+
+  const Mesh& templ_;
+  steps::Graph graph_;
+  std::vector<steps::Landmark> landmarks_;
+  steps::Matcher matcher_;
+  const RegisterOptions& options_;
+  const Progress& progress_;
+};
+
+core::Unexpected unsolvable() {
+  return fail(ErrorCode::kInvalidArgument, "",
+              "the template does not fit the target: the equations have no solution");
+}
+
+core::Result<Points> Laying::coarse(const Points& start) const {
+  const steps::Nodes nodes = steps::spread(graph_, start, options_.nodes);
+  steps::Coarse coarse(nodes, start);
+  Points now = start;
+  double done = 0;
+  for (const CoarseStep& step : kCoarse) {
+    for (int round = 0; round < step.rounds; ++round) {
+      if (!go_on(kPrepared +
+                 (kCoarsely - kPrepared) * done / static_cast<double>(kCoarse.size()))) {
+        return stopped();
+      }
+      const Points normals = steps::vertex_normals(now, templ_.triangles);
+      auto matches = matcher_.by_features(now, normals, step.counting);
+      mirror(now, false, matches);
+      if (!coarse.solve(matches, landmarks_, {step.stiffness, step.landmarks})) {
+        return unsolvable();
+      }
+      now = coarse.moved();
+      done += 1.0 / step.rounds;
+    }
+  }
+  return now;
+}
+
+core::Result<Points> Laying::fine(const Points& base) const {
+  steps::Fine fine(graph_, base);
+  double done = 0;
+  for (const FineStep& step : kFine) {
+    for (int round = 0; round < step.rounds; ++round) {
+      if (!go_on(kCoarsely + (1 - kCoarsely) * done / static_cast<double>(kFine.size()))) {
+        return stopped();
+      }
+      const Points normals = steps::vertex_normals(fine.points(), templ_.triangles);
+      const auto matches = matcher_.by_distance(fine.points(), normals, step.farthest, kLeastCosine,
+                                                step.robust, step.along);
+      if (!fine.solve(matches, step.stiffness)) return unsolvable();
+      done += 1.0 / step.rounds;
+    }
+  }
+  return fine.points();
+}
+
+std::vector<steps::Landmark> landmarks_of(const std::vector<Pair>& pairs, const steps::Scale& scale,
+                                          double noise) {
+  // Errors of pairs count by their variance; the steps are made for those of kNoise.
+  const double sure = kNoise * kNoise / std::max(noise * noise, kNoise * kNoise / kSurest);
+  std::vector<steps::Landmark> out;
+  for (const Pair& pair : pairs) {
+    if (pair.weight > 0) out.push_back({pair.vertex, scale.in(pair.point), sure * pair.weight});
+  }
+  return out;
+}
+
+/// What is told of the vertices where they lie now.
+Registered told(const Points& points, const Mesh& templ, const steps::Matcher& matcher,
+                const steps::Looks& looks, const steps::Scale& scale,
+                const std::vector<std::int32_t>& whole) {
+  const Points normals = steps::vertex_normals(points, templ.triangles);
+  const auto alike = matcher.closest(points, normals, 1e6, kLeastCosine);
+  const auto any = matcher.closest(points, normals, 1e6, -2.0);
+  Registered out;
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    const bool same = alike[v].triangle >= 0 && alike[v].distance <= any[v].distance + kFound;
+    const auto& found = same ? alike[v] : any[v];
+    out.points.push_back(scale.out(points[v]));
+    out.triangle.push_back(found.triangle < 0 ? -1
+                                              : whole[static_cast<std::size_t>(found.triangle)]);
+    out.shares.push_back({found.shares[0], found.shares[1], found.shares[2]});
+    out.distance.push_back(found.distance / scale.mm);
+    out.trusted.push_back(same && looks.belief[v] > 0 && found.distance < kFound &&
+                          !found.beyond_border);
+  }
+  return out;
+}
+
+}  // namespace
+
+core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
+                                          const std::vector<Pair>& pairs,
+                                          const std::vector<Vector3>& start,
+                                          const RegisterOptions& options,
+                                          const Progress& progress) {
+  RISORIUS_TRY(steps::check(templ, target, pairs, start, options));
+  std::vector<Vector3> begin = start;
+  if (begin.empty()) {
+    auto made = steps::aligned(templ, pairs);
+    if (!made) return std::move(made).propagate();
+    begin = std::move(made).value();
+  }
+  const steps::Scale scale = steps::scale_of(templ, begin, options.mm);
+  steps::Form form;
+  for (const Vector3& p : begin) form.points.push_back(scale.in(p));
+  form.triangles = templ.triangles;
+  form.normals = steps::vertex_normals(form.points, form.triangles);
+  if (progress && !progress(0.0)) return stopped();
+  std::vector<std::int32_t> whole;
+  auto near = steps::near_target(target, form.points, scale, options.threads, whole);
+  if (!near) return std::move(near).propagate();
+  if (progress && !progress(kPrepared / 2)) return stopped();
+  const steps::Looks looks =
+      steps::looks_of(form, options.trusted, near.value().samples.spacing, options.threads);
+  const Laying laying(templ, near.value(), looks, landmarks_of(pairs, scale, options.noise),
+                      options, progress);
+  auto coarse = laying.coarse(form.points);
+  if (!coarse) return std::move(coarse).propagate();
+  auto fine = laying.fine(coarse.value());
+  if (!fine) return std::move(fine).propagate();
+  if (progress && !progress(1.0)) return stopped();
+  return told(fine.value(), templ, laying.matcher(), looks, scale, whole);
+}
+
+}  // namespace risorius::registering

@@ -1,0 +1,357 @@
+# SPDX-License-Identifier: MIT
+"""A DNA file's own topology takes the form of another head."""
+
+import copy
+import json
+from types import SimpleNamespace
+
+import face_shapes
+import jointed_face
+import numpy as np
+import oracle
+import pytest
+import risorius
+import skin_oracle
+from risorius.anyhead.conform import conform, conform_face, head, is_same_topology
+from risorius.anyhead.conform.parts import Ball
+from risorius.anyhead.errors import Stopped
+from risorius.anyhead.registration import Registered
+from risorius.author.geometry import skeleton as sk
+from risorius.author.heads.parts import HeadPart
+from risorius.author.input.obj import ObjMesh
+from risorius.base.errors import ArgumentError
+from risorius.cli import main
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*several axes")
+SKIN = "head_lod0_mesh"
+LID = 12  # a joint of the skin
+EYES = {"eyeLeft_lod0_mesh": (6, (3, 3, 6)), "eyeRight_lod0_mesh": (7, (-3, 3, 6))}
+
+
+def ball(middle, joint, radius=1.3, rings=8, around=12):
+    """A sphere of quads and two fans of triangles, which hangs on one joint."""
+    up = np.linspace(0, np.pi, rings + 1)[1:-1]
+    turn = np.arange(around) * 2 * np.pi / around
+    ring = np.stack(
+        [np.outer(np.sin(up), np.cos(turn)), np.outer(np.sin(up), np.sin(turn))], axis=-1
+    )
+    height = np.repeat(np.cos(up), around).reshape(len(up), around, 1)
+    points = np.concatenate([ring, height], axis=-1).reshape(-1, 3)
+    points = radius * np.concatenate([points, [[0, 0, 1], [0, 0, -1]]]) + middle
+    at = np.arange(len(up) * around).reshape(len(up), around)
+    after = np.roll(at, -1, axis=1)
+    faces = [
+        list(q)
+        for q in zip(at[:-1].flat, at[1:].flat, after[1:].flat, after[:-1].flat, strict=True)
+    ]
+    faces += [[len(points) - 2, a, b] for a, b in zip(at[0], after[0], strict=True)]
+    faces += [[len(points) - 1, b, a] for a, b in zip(at[-1], after[-1], strict=True)]
+    flat = np.arange(len(points))
+    return risorius.Mesh(
+        positions=points, normals=(points - middle) / radius, texture_coordinates=points[:, :2],
+        layout_positions=flat, layout_texture_coordinates=flat, layout_normals=flat,
+        face_offsets=np.cumsum([0, *map(len, faces)]), face_layouts=np.concatenate(faces),
+        maximum_influence_per_vertex=1, skin_offsets=np.arange(len(points) + 1),
+        skin_weights=np.ones(len(points)), skin_joint_indices=np.full(len(points), joint),
+    )  # fmt: skip
+
+
+def with_lid(mesh):
+    """A skin whose left lid has a joint at the centre of the eye, so that it slides on the eye."""
+    lid = (np.abs(mesh.positions[:, :2] - 3.0) < 1.7).all(axis=1)
+    joints = np.array(mesh.skin_joint_indices).reshape(-1, 4)
+    weights = np.array(mesh.skin_weights).reshape(-1, 4)
+    joints[lid], weights[lid] = [LID, 0, 1, 2], [1, 0, 0, 0]
+    mesh.skin_joint_indices, mesh.skin_weights = joints.ravel(), weights.ravel()
+    return mesh
+
+
+@pytest.fixture(scope="module")
+def face():
+    """Joints with directions of their own, eyes, three levels."""
+    dna = jointed_face.build()
+    eyes = [ball(middle, joint) for joint, middle in EYES.values()]
+    dna.meshes = [*map(with_lid, dna.meshes), *eyes]
+    dna.mesh_names = [*dna.mesh_names, *EYES]
+    dna.lod_mesh_mapping = [[0, 3, 4], [1], [2]]
+    places = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
+    places[LID] = EYES["eyeLeft_lod0_mesh"][1]
+    dna.neutral_joint_rotations = np.random.default_rng(4).uniform(-40, 40, places.shape)
+    turns = sk.world_matrices(dna, np.zeros((len(places), 9)))[:, :3, :3]
+    parents = np.asarray(dna.joint_parents, np.int64)
+    local = np.einsum("jki,jk->ji", turns[parents], places - places[parents])
+    local[0] = places[0]
+    dna.neutral_joint_translations = local
+    return risorius.load(dna.to_bytes())
+
+
+def skin_points(dna):
+    return np.asarray(dna.meshes[0].positions, np.float64)
+
+
+def stretched(points):
+    """Another form: wider above, a longer chin."""
+    out = points * [1.1, 1.0, 0.95]
+    out[:, 0] *= 1 + 0.01 * points[:, 1]
+    out[:, 1] -= 0.02 * np.clip(-points[:, 1], 0, None) ** 1.5
+    return out + np.array([0.3, 120, -2])
+
+
+def posed(dna, mesh, **raw):
+    """float64[V, 3] by the tests' own evaluator and skinning."""
+    rig = risorius.Rig(dna)
+    values = np.array(rig.initial_raw_controls, np.float64)
+    for name, value in raw.items():
+        values[dna.raw_control_names.index(f"CTRL_expressions.{name}")] = value
+    lod = next(i for i, row in enumerate(dna.lod_mesh_mapping.rows) if mesh in row)
+    joints, shapes, _, _ = oracle.evaluate(
+        dna, values, lod, settle=True, control_count=rig.control_count
+    )
+
+    class Pose:
+        pass
+
+    pose = Pose()
+    pose.joints, pose.blend_shapes = joints[0].reshape(-1, 9), shapes[0]
+    return skin_oracle.skinned(dna, pose, mesh)
+
+
+POSES = ({}, {"jawOpen": 1.0, "mouthSmileLeft": 0.7}, {"eyeBlinkLeft": 1.0, "browOuterUpRight": 1})
+
+
+def test_its_own_form_leaves_a_face_as_it_is(face):
+    same = conform(face, {SKIN: skin_points(face)})
+    for before, after in zip(face.meshes, same.meshes, strict=True):
+        for name in ("positions", "normals"):
+            assert np.abs(getattr(before, name) - getattr(after, name)).max() < 1e-5
+        for own, other in zip(before.blend_shape_targets, after.blend_shape_targets, strict=True):
+            assert np.abs(own.deltas - other.deltas).max() < 1e-6
+    assert np.abs(face.neutral_joint_translations - same.neutral_joint_translations).max() < 2e-5
+    assert np.array_equal(face.neutral_joint_rotations, same.neutral_joint_rotations)
+    for before, after in zip(face.joint_groups, same.joint_groups, strict=True):
+        assert np.abs(before.values - after.values).max() < 1e-5
+
+
+@pytest.mark.parametrize("degrees", [0.0, 65.0])
+def test_a_head_that_is_moved_and_larger_is_so_in_each_pose(face, degrees):
+    angle = np.radians(degrees)
+    turn = sk.matrices_of_vectors(angle * np.array([0.6, -0.64, 0.48]))
+
+    def there(points):
+        return 1.7 * points @ turn.T + [5, -20, 3]
+
+    other = conform(face, {SKIN: there(skin_points(face))})
+    for pose in POSES:
+        for mesh in (1, 3):
+            wanted, found = there(posed(face, mesh, **pose)), posed(other, mesh, **pose)
+            assert np.abs(wanted - found).max() < 2e-4, (pose, mesh)
+
+
+def test_another_form_keeps_names_counts_and_layers(face):
+    other = risorius.load(conform(face, {SKIN: stretched(skin_points(face))}).to_bytes())
+    before, after = (json.loads(dna.to_json()) for dna in (face, other))
+
+    def outline(value):
+        if isinstance(value, dict):
+            return {key: outline(own) for key, own in value.items()}
+        if isinstance(value, list):
+            numbers = all(isinstance(own, int | float) for own in value)
+            return len(value) if numbers else [outline(own) for own in value]
+        return type(value)
+
+    assert outline(before) == outline(after)
+    changed = {key for key in before if before[key] != after[key]}
+    assert changed == {"defn1.1", "bhvr1.1", "geom1.1"}
+    assert list(face.joint_names) == list(other.joint_names)
+    assert np.abs(posed(other, 0) - stretched(skin_points(face))).max() < 1e-4
+
+
+def test_coarser_levels_lie_on_the_skin_and_act_as_it_does(face):
+    other = conform(face, {SKIN: stretched(skin_points(face))})
+    grid = np.arange(506).reshape(face_shapes.DOWN, face_shapes.ACROSS)
+    for lod, step in ((1, 2), (2, 3)):
+        same = grid[::step, ::step].ravel()
+        off = other.meshes[lod].positions - other.meshes[0].positions[same]
+        assert np.abs(off).max() < 1e-3
+    fine, coarse = (posed(other, m, mouthSmileLeft=1) - posed(other, m) for m in (0, 1))
+    was = [posed(face, m, mouthSmileLeft=1) - posed(face, m) for m in (0, 1)]
+    same = grid[::2, ::2].ravel()
+    apart = np.abs(fine[same] - coarse).max()
+    assert apart < 1.5 * np.abs(was[0][same] - was[1]).max() + 0.02
+
+
+def test_what_controls_do_grows_as_the_face_does_there(face):
+    before = skin_points(face)
+    wide = before * [2.0, 1.0, 1.0]
+    other = conform(face, {SKIN: wide})
+    own, found = (posed(d, 0, mouthSmileLeft=1) - posed(d, 0) for d in (face, other))
+    middle = (np.abs(before[:, 0]) < 4) & (np.linalg.norm(own, axis=1) > 0.2)
+    assert np.median(found[middle, 0] / own[middle, 0]) == pytest.approx(2.0, abs=0.35)
+    assert np.median(found[middle, 1] / own[middle, 1]) == pytest.approx(1.0, abs=0.2)
+
+
+def test_eyes_stay_spheres_about_their_joints_and_turn_in_place(face):
+    other = conform(face, {SKIN: stretched(skin_points(face))})
+    frames = sk.world_matrices(other, np.zeros((len(other.joint_names), 9)))
+    for mesh, (joint, middle) in zip((3, 4), EYES.values(), strict=True):
+        points = np.asarray(other.meshes[mesh].positions, np.float64)
+        far = np.linalg.norm(points - frames[joint, :3, 3], axis=1)
+        assert np.ptp(far) < 1e-4
+        assert 1.0 < far.mean() < 1.7
+        assert np.linalg.norm(frames[joint, :3, 3] - stretched(np.array([middle]))[0]) < 1.0
+    balls = [Ball(np.array([3.5, 123.0, 4.0]), 1.1), Ball(np.array([-3.0, 123.0, 4.0]), 1.2)]
+    given = conform(face, {SKIN: stretched(skin_points(face))}, balls=balls)
+    points = np.asarray(given.meshes[3].positions, np.float64)
+    assert np.linalg.norm(points - balls[0].middle, axis=1) == pytest.approx(1.1, abs=1e-4)
+
+
+def test_axes_and_units_of_the_file_do_not_matter(face):
+    moved = {SKIN: stretched(skin_points(face))}
+    system = dict(
+        axes=("front", "left", "down"), rotation_sequence="zxy", rotation_signs=(1, -1, 1),
+        face_winding_order="cw", translation_unit="m", rotation_unit="radians",
+    )  # fmt: skip
+    there, wanted = face.convert(**system), conform(face, moved).convert(**system)
+    x, y, z = moved[SKIN].T / 100
+    found = conform(there, {SKIN: np.stack([z, -x, -y], axis=1)})
+    for a, b in zip(found.meshes, wanted.meshes, strict=True):
+        assert np.abs(a.positions - b.positions).max() < 1e-5
+        assert np.abs(a.normals - b.normals).max() < 0.05  # polygons are cut another way
+    # Vertices are grouped in cells along the axes, which affects a root far below most.
+    off = np.abs(found.neutral_joint_translations - wanted.neutral_joint_translations)
+    assert off.max() < 3e-3
+    assert np.median(off) < 1e-4
+    assert np.array_equal(found.neutral_joint_rotations, wanted.neutral_joint_rotations)
+    for a, b in zip(found.joint_groups, wanted.joint_groups, strict=True):
+        assert np.abs(a.values - b.values).max() < 2e-4
+
+
+def as_part(dna, points, cut=False, name="sculpt"):
+    """The skin as a mesh of another program."""
+    mesh = dna.meshes[0]
+    faces = np.asarray(mesh.layout_positions)[np.asarray(mesh.face_layouts)].reshape(-1, 4).tolist()
+    if cut:
+        faces = [t for a, b, c, d in faces for t in ([b, c, d], [b, d, a])]
+    return HeadPart(name, ObjMesh(points, np.zeros((0, 2)), faces), source=name)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_a_sculpt_is_known_by_its_polygons_in_any_axes_and_unit(face, cut):
+    points = stretched(skin_points(face))
+    in_metres = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) / 100
+    part = as_part(face, in_metres, cut)
+    assert is_same_topology(face, part.mesh)
+    made = conform_face(face, [part])
+    assert made.sculpted == [SKIN]
+    assert "multiplied by 100" in made.notes[1]
+    wanted = conform(face, {SKIN: points})
+    for a, b in zip(made.dna.meshes, wanted.meshes, strict=True):
+        assert np.abs(a.positions - b.positions).max() < 1e-4
+    shuffled = as_part(face, in_metres)
+    shuffled.mesh.faces[7] = [0, 1, 2, 3]
+    assert not is_same_topology(face, shuffled.mesh)
+
+
+def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeypatch):
+    """Other tests cover the earlier steps, so these are replaced by exact results here."""
+    system = {"axes": ("front", "left", "down"), "translation_unit": "m"}
+    mirrored = face.convert(**system, face_winding_order="ccw")
+    points = stretched(skin_points(face))  # cm, standing
+    lean = sk.matrices_of_vectors(np.array([0, np.pi / 2, 0]))
+    given = 1.0 * points @ lean.T + [40, -3, 7]
+    marks = {f"eye_{place}_{s}": np.zeros(3) for place in ("inner", "outer") for s in "LR"}
+    found = SimpleNamespace(landmarks=SimpleNamespace(points=marks), pose=SimpleNamespace(scale=1))
+    part = as_part(face, given)
+    part.mesh.faces.reverse()
+    part.mesh.faces[0] = [0, 30, 77]  # no polygon of the face
+    standing = SimpleNamespace(parts=[part], found=found, notes=["as it is"])
+    monkeypatch.setattr(head, "stand", lambda *_: standing)
+    monkeypatch.setattr(head, "find_form", lambda *_: found)
+    monkeypatch.setattr(head, "start_of", lambda *_: None)
+    seen = []
+
+    def register(template, target, pairs, options, start, progress):
+        seen.append((template, target))
+        progress(1.0)
+        sure = np.ones(len(given), bool)
+        return Registered(given, np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros(0), sure)
+
+    monkeypatch.setattr(head, "register", register)
+    heard = []
+    made = conform_face(mirrored, [part], None, heard.append)
+    template, target = seen[0]
+    assert np.abs(template.points - skin_points(face)).max() < 1e-4
+    assert (template.normals()[:, 2] > 0).mean() > 0.9
+    assert np.abs(target.points - given).max() < 1e-9
+    x, y, z = (points - points.mean(axis=0) + skin_points(face).mean(axis=0)).T / 100
+    assert np.abs(made.moved - np.stack([z, -x, -y], axis=1)).max() < 1e-6
+    assert made.notes == ["as it is"]
+    assert made.sculpted == []
+    assert heard == sorted(heard)
+    assert heard[-1] == 1.0
+    with pytest.raises(Stopped):
+        conform_face(mirrored, [part], None, lambda share: share < 0.5)
+
+
+def test_meshes_of_another_face_are_a_head(face):
+    other = conform(face, {SKIN: stretched(skin_points(face))})
+    made = conform_face(face, head.parts_of(other.convert(axes=("right", "front", "up"))))
+    assert made.sculpted == [SKIN, *EYES]
+    for a, b in zip(made.dna.meshes, other.meshes, strict=True):
+        assert np.abs(a.positions - b.positions).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda p: {}, "the skin, were expected"),
+        (lambda p: {SKIN: p[:-1]}, "506 places were expected, found 505"),
+        (lambda p: {SKIN: np.where(p == p[0], np.nan, p)}, "no place that a number can say"),
+        (lambda p: {SKIN: p, "nose": p}, "nose: a mesh of the face was expected"),
+        (lambda p: {SKIN: 0 * p}, "all vertices lie at one place"),
+    ],
+)
+def test_places_that_cannot_be_are_one_sentence(face, change, said):
+    with pytest.raises(ArgumentError, match=said):
+        conform(face, change(skin_points(face)))
+    bare = copy.copy(face)
+    bare.mesh_names = ["eyeA", "eyeB", "eyeC", *EYES]
+    with pytest.raises(ArgumentError, match="a mesh of skin at LOD 0 was expected"):
+        conform(bare, {SKIN: skin_points(face)})
+
+
+def test_progress_rises_and_may_stop(face):
+    heard = []
+    conform(face, {SKIN: skin_points(face)}, heard.append)
+    assert heard == sorted(heard)
+    assert heard[-1] == 1.0
+    with pytest.raises(Stopped):
+        conform(face, {SKIN: skin_points(face)}, lambda share: share < 0.5)
+
+
+def test_the_command_writes_the_face_of_a_sculpt(face, tmp_path, capsys):
+    head, source, out = tmp_path / "head.obj", tmp_path / "face.dna", tmp_path / "out.dna"
+    points = stretched(skin_points(face))
+    face_shapes.write_obj(head, points, face_shapes.head()[1])
+    source.write_bytes(face.to_bytes("2.5"))
+    command = ["author", "--conform", head, source, "-o", out]
+    assert main([str(word) for word in command]) == 0
+    said = capsys.readouterr().out
+    assert "head_lod0_mesh: the head has the face's own polygons" in said
+    made = risorius.load(out)
+    assert made.version == 5
+    assert np.abs(posed(made, 0) - points).max() < 1e-3
+    assert main([str(word) for word in [*command, "--json"]]) == 0
+    assert json.loads(capsys.readouterr().out)["registered"] is False
+    kept = out.read_bytes()
+    for more, code, sentence in (
+        (["--bound"], 2, "--conform takes no --bound"),
+        (["--scale", "nan"], 2, "--scale"),
+        (["--height-mm", "240"], 1, "the head has the face's own polygons"),
+    ):
+        assert main([str(word) for word in [*command, *more]]) == code
+        assert sentence in capsys.readouterr().err
+    assert main(["author", "--conform", str(head), str(source), "-o", str(source)]) == 2
+    assert main(["author", "--conform", str(head), "-o", str(out)]) == 2
+    assert main(["author", "--conform", str(tmp_path / "no.obj"), str(source), "-o", str(out)]) == 1
+    assert out.read_bytes() == kept

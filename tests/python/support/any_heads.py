@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: MIT
+"""Heads of which every place is known on two surfaces of other vertices.
+
+A head of a formula is a function from directions to points: the same directions on two forms
+belong together, whatever vertices either mesh has. Heads of the generator have the same vertices
+on each person; `remeshed` gives one of them other vertices.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+from risorius import _native
+from risorius.anyhead.surface import Surface
+
+HEAD_MM = 240.0
+# Landmarks of a head of a formula: angles to the left and up, degrees.
+MARKS = (
+    *((-24, 12), (24, 12), (-9, 12), (9, 12), (0, -8), (-14, -26), (14, -26), (0, -52)),
+    *((90, 0), (-90, 0), (0, 89)),
+)
+# Bumps: angles to the left and up, width in degrees, height as a share of the radius.
+_BUMPS = (
+    (0, -8, 9, 0.22),  # nose
+    (-17, 12, 9, -0.10),  # eyes
+    (17, 12, 9, -0.10),
+    (0, 28, 22, 0.05),  # brow
+    (0, -27, 12, 0.05),  # mouth
+    (0, -50, 15, 0.10),  # chin
+    (-90, 0, 12, 0.12),  # ears
+    (90, 0, 12, 0.12),
+)
+
+
+def direction(left: float, up: float) -> np.ndarray:
+    """float64[3] of angles in degrees; 0, 0 is the front."""
+    a, b = np.radians([left, up])
+    return np.array([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
+
+
+def form(directions: np.ndarray, seed: int = 0, size: float = 12.0) -> np.ndarray:
+    """float64[n, 3], the points of a head in these directions.
+
+    Args:
+        directions: float64[n, 3] of length 1.
+        seed: 0: the template; others differ in proportions and in places and heights of bumps.
+        size: half the height, in any unit.
+    """
+    random = np.random.default_rng(seed)
+    much = 1.0 if seed else 0.0
+    points = np.ones(len(directions))
+    for left, up, width, height in _BUMPS:
+        aside, above, wider, higher = much * random.normal(0, (1.5, 1.5, 0.08, 0.15))
+        middle = direction(left + np.sign(left) * aside, up + above)
+        away = np.degrees(np.arccos(np.clip(directions @ middle, -1, 1))) / (width * (1 + wider))
+        points += height * (1 + higher) * np.exp(-0.5 * away**2)
+    scales = np.array([0.72, 1.0, 0.85]) * (1 + much * random.normal(0, 0.05, 3))
+    return directions * points[:, None] * scales * size
+
+
+def sphere(rows: int, columns: int, turn: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Directions float64[V, 3] and triangles int64[T, 3] of a closed sphere.
+
+    Args:
+        rows: of vertices between the poles.
+        columns: of vertices around.
+        turn: of the poles from the vertical, radians.
+    """
+    up = (np.arange(rows) + 1) / (rows + 1) * np.pi - np.pi / 2
+    around = np.arange(columns) / columns * 2 * np.pi
+    ring = np.stack([np.sin(around), np.zeros(columns), np.cos(around)], 1)
+    grid = np.cos(up)[:, None, None] * ring + np.sin(up)[:, None, None] * np.array([0, 1, 0])
+    points = np.concatenate([grid.reshape(-1, 3), [[0, -1, 0], [0, 1, 0]]])
+    bottom, top = rows * columns, rows * columns + 1
+    triangles = []
+    for c in range(columns):
+        d = (c + 1) % columns
+        triangles += [(bottom, d, c), (top, (rows - 1) * columns + c, (rows - 1) * columns + d)]
+        for r in range(rows - 1):
+            a, b = r * columns + c, r * columns + d
+            triangles += [(a, b, b + columns), (a, b + columns, a + columns)]
+    s, c = np.sin(turn), np.cos(turn)
+    return points @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), np.array(triangles)
+
+
+def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.ndarray]:
+    """A template, a target of other vertices, and float64[V, 3] where the template's belong."""
+    directions, triangles = sphere(30, 44)
+    others, corners = sphere(47, 61, turn=0.9)
+    template = Surface(form(directions), triangles)
+    return template, Surface(form(others, seed, size), corners), form(directions, seed, size)
+
+
+def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
+    """Pairs at MARKS. Args: noise: of the points, in the unit of `true`."""
+    random = np.random.default_rng(seed)
+    looks = template.points / np.linalg.norm(template.points, axis=1, keepdims=True)
+    vertices = [int(np.argmax(looks @ direction(*mark))) for mark in MARKS]
+    return [(v, true[v] + random.normal(0, noise, 3)) for v in vertices]
+
+
+def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """float64[V], how far vertices lie from their true places along the surface, in its unit."""
+    normals = Surface(true, template.triangles).normals()
+    away = found - true
+    return np.linalg.norm(away - (away * normals).sum(1, keepdims=True) * normals, axis=1)
+
+
+@functools.cache
+def generator():
+    """The data of the generator's people; a test that has none does not run."""
+    import sample_people
+
+    return sample_people.data()
+
+
+def random_person(seed: int, source):
+    """A person whose age, build, origin and features are drawn."""
+    from risorius_people.people import MAN
+    from risorius_people.source import TARGETS
+
+    random = np.random.default_rng(seed)
+    folders = ("chin", "cheek", "mouth", "nose", "forehead", "head", "eyes", "ears", "neck")
+    names = {
+        name.removeprefix(TARGETS).removesuffix(".target.gz")
+        for name in source._names
+        if name.startswith(TARGETS)
+    }
+    pool = sorted(
+        {
+            n.split("/")[0] + "/" + n.split("/")[-1].removeprefix("l-")
+            for n in names
+            if n.split("/")[0] in folders and not n.split("/")[-1].startswith("r-")
+        }
+    )
+    features: dict[str, float] = {}
+    for name in random.choice(pool, 14, replace=False):
+        swaps = (("incr", "decr"), ("decr", "incr"))
+        if not any(name.replace(a, b) in features for a, b in swaps if a in name):
+            features[str(name)] = float(random.uniform(0.1, 0.6))
+    shares = random.dirichlet([1, 1, 1]).tolist()
+    return dataclasses.replace(
+        MAN,
+        name=f"Drawn{seed}",
+        gender=str(random.choice(["male", "female"])),
+        age=int(random.integers(14, 75)),
+        muscle=float(random.uniform(0.2, 0.8)),
+        weight=float(random.uniform(0.2, 0.8)),
+        features=features,
+        origin=dict(zip(("caucasian", "african", "asian"), shares, strict=True)),
+        asymmetry={},
+    )
+
+
+def skin_of(person, source) -> Surface:
+    """The skin of a person at its finest level, in centimetres; all have the same vertices."""
+    from risorius_people import blend_shape_face
+
+    _, parts, body = blend_shape_face.assemble(source, lambda _: None, person)
+    part = next(p for p in parts if p.name == "head_lod0_mesh")
+    points = part.carry(body.positions) * blend_shape_face.CM
+    return Surface.of_polygons(points, part.polygons.faces)
+
+
+def remeshed(skin: Surface, share: float = 0.5, seed: int = 0) -> Surface:
+    """The same surface with other vertices: edges are cut at random places, then most vertices go.
+
+    Args:
+        share: of the triangles that the skin has.
+        seed: of the places.
+    """
+    random = np.random.default_rng(seed)
+    edges = skin.edges()
+    number = {(int(a), int(b)): i for i, (a, b) in enumerate(edges)}
+    at = random.uniform(0.3, 0.7, (len(edges), 1))
+    cuts = (1 - at) * skin.points[edges[:, 0]] + at * skin.points[edges[:, 1]]
+    first = len(skin.points)
+    triangles = []
+    for a, b, c in skin.triangles.tolist():
+        x, y, z = (first + number[min(p, q), max(p, q)] for p, q in ((a, b), (b, c), (c, a)))
+        triangles += [(a, x, z), (x, b, y), (z, y, c), (x, y, z)]
+    points = np.concatenate([skin.points, cuts])
+    count = int(share * len(skin.triangles))
+    kept, _ = _native.simplify(
+        points.astype(np.float32), np.zeros((len(points), 0), np.float32),
+        np.array(triangles, np.uint32), count,
+    )  # fmt: skip
+    used, corners = np.unique(kept, return_inverse=True)
+    return Surface(points[used], corners.reshape(-1, 3))
