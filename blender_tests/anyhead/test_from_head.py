@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make Rig from Head and Conform Face to Head: what is asked, what comes, what stays."""
+"""Make Rig from Head and Conform Face to Head make faces, refuse bad input, and keep the head."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -61,6 +62,25 @@ def test_a_head_without_expressions_becomes_a_face(head, onto, dna_file, tmp_pat
     names = {point.name for point in head.children}
     assert names == {*PLACES, "chin"}  # shown, for the next time
     assert head.data.shape_keys is None  # it stays as it was
+
+
+def test_a_head_may_be_half_a_mesh_with_a_mirror(head, onto, dna_file, tmp_path):
+    whole = len(head.data.polygons)
+    bm = bmesh.new()
+    bm.from_mesh(head.data)
+    gone = [v for v in bm.verts if v.co.x < -1e-6]
+    bmesh.ops.delete(bm, geom=gone, context="VERTS")
+    bm.to_mesh(head.data)
+    bm.free()
+    head.modifiers.new("Mirror", "MIRROR")
+    head.modifiers.new("Smooth", "SUBSURF")
+    file = {"template": "FILE", "template_file": str(dna_file)}
+    assert make(tmp_path / "egg.dna", **file) == {"FINISHED"}
+    assert len(onto.heads[0].parts[0].mesh.positions) == 506
+    mesh = scene.meshes(rigs()[0])[0].data
+    assert (len(mesh.polygons), [m.name for m in mesh.materials]) == (whole, ["Skin"])
+    assert not [mesh for mesh in bpy.data.meshes if not mesh.users]
+    assert len(head.modifiers) == 2
 
 
 def test_the_face_of_the_scene_lends_its_expressions(head, onto, dna_file, tmp_path):
@@ -131,10 +151,14 @@ def test_a_face_takes_the_form_of_a_head(head, onto, dna_file, tmp_path):
     head.select_set(True)
     assert risorius.conform_face(filepath=str(tmp_path / "new.dna")) == {"FINISHED"}
     assert len(rigs()) == 2
+    new = next(item for item in rigs() if item != rig)
+    left = min(scene.evaluated(mesh)[:, 0].min() for mesh in scene.meshes(new).values())
+    assert left > max((head.matrix_world @ v.co).x for v in head.data.vertices)  # beside it
     ((dna, read),) = onto.asked
     assert dna is scene.submodule("scene.character.runtime").there(rig).dna
     assert len(read.parts[0].mesh.positions) == 506
     assert (tmp_path / "new.dna").is_file()
+    bpy.ops.object.select_all(action="DESELECT")
     bpy.context.view_layer.objects.active = head
     scene.controls(rig).select_set(True)
     with pytest.raises(RuntimeError, match="the face's own file"):

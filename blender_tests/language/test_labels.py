@@ -8,6 +8,7 @@ import bpy
 import pytest
 from support import measured, scene
 from support.measured import DIALOG, FILE_BROWSER, SIDEBAR, Operator, Part, drawn
+from support.plain_head import Package, plain_head
 
 TABLES = Path(__file__).resolve().parents[2] / "addon" / "risorius" / "language"
 LANGUAGES = sorted(path.stem.partition("_")[2] for path in TABLES.glob("interface_*.toml"))
@@ -77,6 +78,24 @@ def test_every_panel_can_be_read(rig, language):
         assert texts(layout)
         cut = [text for text, _needed, _room in layout.cut(SIDEBAR) if not text.startswith("Xxx")]
         assert cut == [], kind  # beside a name of 90 letters
+
+
+def test_what_a_head_lacks_can_be_read(monkeypatch, language):
+    Package(monkeypatch).places.clear()
+    plain_head()
+    landmarks = scene.submodule("native").part("anyhead.landmarks.names")
+    finding = scene.submodule("scene.anyhead.finding")
+    monkeypatch.setattr(finding, "words", landmarks.landmark_words)
+    monkeypatch.setattr(finding, "needed", landmarks.needed_landmarks)
+    bpy.ops.risorius.place_landmark(landmark="ear_top_L")
+    panel = ui("anyhead.panel")
+    monkeypatch.setattr(panel, "_MOST", 99)
+    layout = drawn(panel.RISORIUS_PT_head, bpy.context)
+    assert measured.local("the middle of the left upper lid") in " ".join(texts(layout))
+    assert layout.cut(SIDEBAR) == []
+    kind = ui("anyhead.operators").RISORIUS_OT_make_rig_from_head
+    options = {"template": "FILE", "template_file": ""}
+    assert Operator(kind, **options).draw(bpy.context).cut(FILE_BROWSER) == []
 
 
 def test_eight_levels_of_detail_have_two_rows_that_can_be_told_apart(rig, monkeypatch, language):

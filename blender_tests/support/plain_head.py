@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions, and doubles of what the package finds on it."""
+"""A head without expressions, and doubles of the package's parts that work on it."""
 
 from types import SimpleNamespace
 
@@ -84,9 +84,9 @@ class Onto(Package):
         monkeypatch.setattr(self._making, "_carry_over", self._carry_over)
         monkeypatch.setattr(self._making, "_conform", self._conform)
 
-    def _carry_over(self, head, dna, transfer, progress):
+    def _carry_over(self, head, template, transfer, progress):
         self.heads.append(head)
-        self.asked.append((dna, transfer))
+        self.asked.append((template.load(), transfer))
         assert progress(0.5)
         part = scene.submodule("native").part
         parts, faces = part("author.heads.parts"), part("author.input.shape_face")
@@ -98,7 +98,9 @@ class Onto(Package):
         marks = SimpleNamespace(points={**self.places, **head.fixed}, notes=[])
         made = SimpleNamespace(shapes=shapes, landmarks=marks, notes=["It stands."])
         face = faces.make_shape_face(shapes, {"jawOpen": ["jawOpen"]})
-        return made, SimpleNamespace(dna=face, kept=(), odd=["It stands.", "It is odd."])
+        return made, SimpleNamespace(
+            dna=face, kept=(), odd=["It stands.", "It is odd."], materials={}
+        )
 
     def _conform(self, head, dna, _progress):
         self.asked.append((dna, head))

@@ -41,12 +41,14 @@ def any_heads(folder: Path) -> None:
 
 
 def sheets(folder: Path) -> None:
-    """A picture of each face that was made. Args: folder  has the faces."""
-    maker = PROJECT / "packaging" / "films" / "any_heads_sheet.py"
-    for face in sorted(folder.glob("*.dna")):
-        subprocess.run(
-            [sys.executable, str(maker), str(face), str(face.with_suffix(".png"))], check=True
-        )
+    """A picture of each face that was made, and of all as they speak. Args: folder  has them."""
+    maker = [sys.executable, str(PROJECT / "packaging" / "films" / "any_heads_sheet.py")]
+    faces = [str(face) for face in sorted(folder.glob("*.dna"))]
+    for face in faces:
+        subprocess.run([*maker, face, face.removesuffix(".dna") + ".png"], check=True)
+    subprocess.run([*maker, *faces, str(folder / "beside.png")], check=True)
+    spoken = [*faces, str(folder / "said.rzc"), str(folder / "speaking.png")]
+    subprocess.run([*maker, *spoken], check=True)
 
 
 # By the name of the page: what comes before it, and after it.

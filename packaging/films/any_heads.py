@@ -88,10 +88,10 @@ def remeshed(
 
 
 def scan(points: Doubles, faces: Faces, seed: int = 4) -> tuple[Doubles, Faces]:
-    """Triangles with noise of 0.1 mm and five holes, none of them in the face itself."""
+    """Triangles with noise of 0.1 mm and five holes, none between eyes and mouth."""
     points, faces = remeshed(
         points, faces, ("SUBSURF", {"levels": 1, "subdivision_type": "SIMPLE"}),
-        ("DECIMATE", {"ratio": 0.5}),
+        ("DECIMATE", {"ratio": 0.25}),
     )  # fmt: skip
     random = np.random.default_rng(seed)
     middles = np.array([points[face].mean(axis=0) for face in faces])

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A face in five expressions and sixteen controls, as one sheet that somebody looks at.
 
-any_heads_sheet.py FACE.dna OUT.png [PIXELS]    needs Pillow; drawn without Blender, in clay
+any_heads_sheet.py FACE.dna... [CLIP.rzc] OUT.png    needs Pillow; drawn without Blender, in clay
+
+Of several faces each has a row of the five expressions; with a clip, a row of seven of its moments.
 """
 
 from __future__ import annotations
@@ -36,9 +38,10 @@ CONTROLS = (
 _COLUMNS = 7
 _COLOURS = (  # by parts of the names of meshes: their colour beside clay
     ("teeth", (1.2, 1.15, 1.0)), ("tongue", (1.1, 0.6, 0.6)), ("gums", (1.1, 0.55, 0.55)),
-    ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)), ("lash", (0.25, 0.2, 0.2)),
+    ("eyeleft", (1.3, 1.3, 1.3)), ("eyeright", (1.3, 1.3, 1.3)),
 )  # fmt: skip
-_CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva")  # nothing one sees in clay
+# What is nothing without its picture: glass, wet edges, cards of lashes and hair.
+_CLEAR = ("cornea", "eyeshell", "eyeedge", "cartilage", "saliva", "lash", "hair", "brows")
 
 
 def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
@@ -46,6 +49,7 @@ def raw_of(dna: risorius.Dna, row: dict[str, float]) -> np.ndarray:
     names = [name.removeprefix(PREFIX) for name in dna.raw_control_names]
     out = np.zeros(len(names), np.float32)
     for wanted, value in row.items():
+        wanted = wanted.removeprefix(PREFIX)  # noqa: PLW2901
         for number, name in enumerate(names):
             if name.startswith(wanted) and len(name) - len(wanted) <= 2:
                 out[number] = value
@@ -75,8 +79,7 @@ class Face:
         eyes = [
             np.asarray(self.dna.meshes[m].positions).mean(axis=0)
             for side in ("eyeleft", "eyeright")
-            for m in self._meshes
-            if self.dna.mesh_names[m].lower().startswith(side)
+            for m in [m for m in self._meshes if self._base(m) == side][:1]
         ]
         if len(eyes) == 2:
             middle, apart = (eyes[0] + eyes[1]) / 2, float(np.linalg.norm(eyes[0] - eyes[1]))
@@ -86,6 +89,9 @@ class Face:
         self._depth = float(middle[2]) - 0.4 * apart  # about which the head is turned
         across = 1.45 * apart
         return middle[0] - across, middle[0] + across, middle[1] - 2.2 * apart, middle[1] + apart
+
+    def _base(self, mesh: int) -> str:
+        return self.dna.mesh_names[mesh].lower().partition("_lod")[0]
 
     def _colour(self, mesh: int, count: int) -> np.ndarray:
         name = self.dna.mesh_names[mesh].lower()
@@ -119,22 +125,65 @@ class Face:
         return out
 
 
-def sheet(path: str, out: str, size: int = 260) -> None:
-    """All pictures of a face. Args: path  of the DNA file; out  of the picture; size  of one."""
-    face = Face(path)
-    rows = {**EXPRESSIONS, **{name: {name: 1.0} for name in CONTROLS}}
-    pictures = [(name, face.picture(row, size)) for name, row in rows.items()]
-    wide, high = pictures[0][1].width, size + 22
-    lines = -(-len(pictures) // _COLUMNS)
-    whole = Image.new("RGB", (wide * _COLUMNS, high * lines), (38, 41, 46))
+def put(rows: list[list[tuple[str, Image.Image]]], out: str) -> None:
+    """Pictures in rows, with what each shows. Args: rows; out  path of the sheet."""
+    first = rows[0][0][1]
+    wide, high = first.width, first.height + 22
+    whole = Image.new("RGB", (wide * max(map(len, rows)), high * len(rows)), (38, 41, 46))
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(size=14)
-    for number, (name, picture) in enumerate(pictures):
-        x, y = number % _COLUMNS * wide, number // _COLUMNS * high
-        whole.paste(picture, (x, y))
-        draw.text((x + 6, y + size + 3), name, fill=(215, 218, 222), font=font)
+    for line, row in enumerate(rows):
+        for column, (name, picture) in enumerate(row):
+            whole.paste(picture, (column * wide, line * high))
+            place = (column * wide + 6, line * high + first.height + 3)
+            draw.text(place, name, fill=(215, 218, 222), font=font)
     Path(out).parent.mkdir(parents=True, exist_ok=True)
     whole.save(out)
 
 
+def sheet(path: str, out: str, size: int = 260) -> None:
+    """All pictures of a face. Args: path  of its file; out  of the sheet; size  of a picture."""
+    face = Face(path)
+    shown = {**EXPRESSIONS, **{name: {name: 1.0} for name in CONTROLS}}
+    pictures = [(name, face.picture(row, size)) for name, row in shown.items()]
+    put([pictures[n : n + _COLUMNS] for n in range(0, len(pictures), _COLUMNS)], out)
+
+
+def beside(paths: list[str], out: str, size: int = 260) -> None:
+    """A row of expressions for each of several faces. Args: paths, out, size  as for sheet."""
+    rows = []
+    for path in paths:
+        face, stem = Face(path), Path(path).stem
+        rows.append([(f"{stem}: {n}", face.picture(row, size)) for n, row in EXPRESSIONS.items()])
+    put(rows, out)
+
+
+def speaking(paths: list[str], clip: str, out: str, size: int = 200) -> None:
+    """A row of moments of a clip for each face.
+
+    Args:
+        paths: of DNA files.
+        clip: path of the animation.
+        out: of the sheet.
+        size: of a picture.
+    """
+    take, rows = risorius.Clip.load(clip), []
+    for path in paths:
+        face, row = Face(path), []
+        for share in np.linspace(0.1, 0.9, _COLUMNS):
+            at = float(take.start + share * take.duration)
+            values = np.asarray(take.sample(np.array([at])))[0]
+            said = dict(zip(take.names, values.tolist(), strict=True))
+            row.append((f"{Path(path).stem}: {at:.2f} s", face.picture(said, size)))
+        rows.append(row)
+    put(rows, out)
+
+
 if __name__ == "__main__":
-    sheet(sys.argv[1], sys.argv[2], *map(int, sys.argv[3:4]))
+    *given, target = sys.argv[1:]
+    faces = [path for path in given if path.endswith(".dna")]
+    if len(faces) < len(given):
+        speaking(faces, given[-1], target)
+    elif len(faces) == 1:
+        sheet(faces[0], target)
+    else:
+        beside(faces, target)

@@ -61,7 +61,8 @@ pictures="first-face first_look 1366
 board-smirk board_primary 1366
 animator-drag animator_drag 1080
 animator-expressions animator_expressions 1080
-animator-shot animator_shot 1080"
+animator-shot animator_shot 1080
+landmarks anyhead_landmarks 1080"
 put_pictures() { # put_pictures FOLDER
   local from to width
   while read -r from to width; do

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The way to the package that finds landmarks: a head as it wants one, its answer on the head."""
+"""Passes heads to the package, which finds landmarks, and brings landmarks back to Blender."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class Finding(NamedTuple):
 
     Attributes:
         places: name -> float64[3].
-        missing: names that are to be placed by hand.
-        notes: a sentence each on what was guessed.
+        missing: names of needed landmarks that were not found.
+        notes: sentences about the head.
     """
 
     places: Mapping[str, Doubles]
@@ -33,13 +33,13 @@ class Finding(NamedTuple):
 
 
 class Head(NamedTuple):
-    """A head as the package takes it; nothing of Blender's is in it.
+    """A head as the package reads it, without objects of Blender.
 
     Attributes:
-        parts: the face first, in centimetres with y up, as shape_key_head.part_of gives them.
-        turn: float64[3, 3], from the head's own coordinates to these.
-        fixed: landmarks that a person moved or placed, in these.
-        named: the object that is the face, where a person says so; "": of several it is guessed.
+        parts: the meshes, the face first, in the space of shape_key_head.turn_of.
+        turn: float64[3, 3], from the coordinates of the head's object to that space.
+        fixed: landmarks that a person moved or placed, in that space.
+        named: name of the object that is the face; "": the package chooses one of the meshes.
     """
 
     parts: Sequence[native.HeadPart]
@@ -49,16 +49,14 @@ class Head(NamedTuple):
 
 
 def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> Head:
-    """What the package is to know of a head.
+    """Read a head and its other meshes.
 
     Args:
         context: the scene says what a unit is.
         head: the mesh that is the face.
         others: meshes that belong to it: eyes, teeth, hair.
     """
-    rows = [
-        shape_key_head.part_of(context, item, head, with_keys=False) for item in (head, *others)
-    ]
+    rows = [shape_key_head.part_at_rest(context, item, head) for item in (head, *others)]
     turn = shape_key_head.turn_of(context, head)
     there = points.of(head)
     fixed = {name: turn @ place for name, place in points.by_hand(there).items()}
@@ -66,7 +64,7 @@ def read(context: Context, head: MeshObject, others: Sequence[MeshObject]) -> He
 
 
 def words() -> Mapping[str, str]:
-    """What sentences call each landmark, by its name, in the package's order."""
+    """The words for each landmark, by its name, in the order of the package."""
     found: Mapping[str, str] = native.part("anyhead.landmarks.names").landmark_words()
     return found
 
@@ -100,7 +98,7 @@ def on_object(head: Head, found: native.Landmarks) -> Finding:
 
 
 def marks_of(head: Head) -> native.Landmarks | None:
-    """What a person said of landmarks, as the package takes it; None: nothing.
+    """The landmarks that a person moved or placed, or None.
 
     Args:
         head: of `read`.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which objects are the head that somebody means, and which face lends its expressions."""
+"""The head and the face that the selection names."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from . import points
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The mesh that is meant: that of a selected landmark, one with landmarks, the active one, else
-    the selected one with most vertices; None where no mesh is selected that is no face yet.
+    """The head of a selected landmark, a selected mesh with landmarks, the active mesh, or the
+    selected mesh with most vertices, in this order. None if only parts of faces are selected.
 
     Args:
         context: has the selection.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head takes expressions from a face, or a face takes a head's form: the work beside Blender."""
+"""Long work on a head without expressions: its rig is made, or a face is conformed to it."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ Result = TypeVar("Result")
 Progress = Callable[[float], None]
 Cancelled = Callable[[], bool]
 
-FIT, JOINTS = "FIT", "JOINTS"  # what is done now
-_FITTED = 0.6  # the share of the whole time at which a head has its expressions
+FIT, JOINTS = "FIT", "JOINTS"  # stages of a task
+_FITTED = 0.6  # share of the total time after which the head has its expressions
 
 
 class HeadTask(Task[Result], Generic[Result]):
-    """Something that takes seconds in two stages. Attributes: stage  FIT or JOINTS."""
+    """A task of two stages. Attributes: stage  FIT or JOINTS."""
 
     stage = FIT
 
     def part(self, stage: str, begin: float, end: float) -> Progress:
-        """A progress for a stage, from its own 0 to 1.
+        """The progress function of a stage, which counts from 0 to 1.
 
         Args:
             stage: FIT or JOINTS.
-            begin, end: shares of the whole.
+            begin, end: shares of the task at which the stage begins and ends.
         """
         self.stage = stage
 
@@ -41,21 +41,22 @@ class HeadTask(Task[Result], Generic[Result]):
 
 
 class Template(NamedTuple):
-    """The face that lends its expressions: a DNA file, or a face of the scene.
+    """The face whose expressions the head gets: a DNA file or a face of the scene.
 
     Attributes:
-        dna: of a face of the scene; None: the file's.
-        path: of the file; of a face of the scene the file that it came from; "": none.
+        dna: the face of the scene; None: the face is loaded from `path`.
+        path: the DNA file; for a face of the scene the file it was imported from, or "".
     """
 
     dna: native.Dna | None = None
     path: str = ""
 
     def load(self) -> native.Dna:
-        """The face.
+        """The template face.
 
         Raises:
-            DnaError, OSError: the file is none, or cannot be read.
+            DnaError: the file is not a DNA file.
+            OSError: the file cannot be read.
         """
         if self.dna is not None:
             return self.dna
@@ -64,20 +65,20 @@ class Template(NamedTuple):
 
 
 class Transfer(NamedTuple):
-    """What is to be carried over. Attributes: strength  1: as on the template; repair  of contacts
-    that the transfer breaks: lids, lips, teeth."""
+    """Options of the transfer. Attributes: strength  factor on all expressions; repair  whether
+    contacts of lids, lips and teeth are repaired."""
 
     strength: float = 1.0
     repair: bool = True
 
 
 class Made(NamedTuple):
-    """What became of a head.
+    """A face made from a head.
 
     Attributes:
-        finding: its landmarks.
-        shapes: what the face was made from.
-        rigged: the face.
+        finding: the landmarks of the head.
+        shapes: the head with its expressions.
+        rigged: the joint rig.
     """
 
     finding: finding.Finding
@@ -88,22 +89,22 @@ class Made(NamedTuple):
 def rig_task(
     head: finding.Head, template: Template, transfer: Transfer, wishes: shape_key_head.RigWishes
 ) -> HeadTask[Made]:
-    """The way from a head without expressions to a DNA file; a cancelled one leaves none.
+    """A task that makes a DNA file of a head without expressions. A cancelled task writes no file.
 
     Args:
         head: of finding.read.
-        template: lends its expressions.
-        transfer: how they are carried over.
-        wishes: what the rig is to be.
+        template: the face with the expressions.
+        transfer: options of the transfer.
+        wishes: options of the rig.
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> Made:
         tell = telling(task.part(FIT, 0.0, _FITTED), cancelled)
-        made, read = _carry_over(head, template.load(), transfer, tell)
+        made, read = _carry_over(head, template, transfer, tell)
         tell = telling(task.part(JOINTS, _FITTED, 1.0), cancelled)
         rig = shape_key_head.joint_rig(read.dna, wishes, read.kept, tell)
         if not cancelled():
-            rig.dna.save(wishes.path)
+            _write(rig.dna, read, wishes.path)
         found = finding.on_object(head, made.landmarks)
         made.shapes.notes = list(dict.fromkeys(made.notes))
         odd = [sentence for sentence in read.odd if sentence not in made.notes]
@@ -114,9 +115,10 @@ def rig_task(
 
 
 def _carry_over(
-    head: finding.Head, dna: native.Dna, transfer: Transfer, progress: Callable[[float], bool]
+    head: finding.Head, template: Template, transfer: Transfer, progress: Callable[[float], bool]
 ) -> tuple[native.Onto, native.Read]:
-    """The head with the expressions of a face, and the face of blend shapes of it."""
+    """The head with the expressions of the template, and the face of blend shapes made of it."""
+    dna, own = template.load(), {part.source for part in head.parts}
     onto, parts = native.part("anyhead.onto"), native.part("author.heads.parts")
     options = onto.OntoOptions(
         strength=transfer.strength,
@@ -128,19 +130,31 @@ def _carry_over(
     name = head.parts[0].name
     made: native.Onto = onto.onto(name, head.parts, "cm", dna, options, progress)
     made.shapes.name = name
+    if template.path:
+        lend = native.part("anyhead.borrowing").lend_materials
+        lend(made.shapes.parts, dna, Path(template.path), own)
     return made, onto.shape_face(made, dna, name)
 
 
+def _write(dna: native.Dna, read: native.Read, path: str) -> None:
+    """Write a face and the textures of the meshes that it has from the template."""
+    textures = native.part("author.heads.textures")
+    found = textures.textures_of(read.materials, textures.texture_folder(Path(path)))
+    named = textures.metadata_of(dna.mesh_names, read.materials, found)
+    dna.metadata = dict(dna.metadata) | named
+    native.part("files.fileio").write_all({Path(path): dna.to_bytes(), **found.files})
+
+
 def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[list[str]]:
-    """A face takes a head's form and is written; a cancelled one leaves no file.
+    """A task that gives a face the form of a head. A cancelled task writes no file.
 
     Args:
-        head: of finding.read, or a sculpt of the face with its own vertices.
-        template: keeps its topology, names and counts.
+        head: of finding.read; it may be a sculpt with the vertices of the face.
+        template: the face.
         path: of the new file.
 
     Returns:
-        A task whose result is what was guessed and done, a sentence each.
+        A task whose result is a list of sentences about the work.
     """
 
     def work(_progress: Progress, cancelled: Cancelled) -> list[str]:
@@ -156,11 +170,11 @@ def conform_task(head: finding.Head, template: Template, path: str) -> HeadTask[
 
 
 def _textures(dna: native.Dna, source: str, path: str) -> dict[Path, bytes]:
-    """The textures beside a face's file, for beside the new one.
+    """The textures that lie beside the DNA file of a face, by their new paths.
 
     Args:
         dna: the face.
-        source: its file, which may be gone; "": none.
+        source: the DNA file of the face, or "". It may have been deleted.
         path: of the new file.
     """
     if not source or not Path(source).is_file():

@@ -25,7 +25,9 @@ _COLORS = {
     PLACED: (0.2, 0.5, 1.0, 1.0),
 }
 _SIZE = 0.012  # of an empty, in the largest side of the box around all landmarks
-_STAYED = 1e-4  # of the same: one that is nearer to where it was found was not moved
+_STAYED = (
+    1e-4  # of the same: one that is nearer to the place where it was found counts as not moved
+)
 
 
 class Point(NamedTuple):

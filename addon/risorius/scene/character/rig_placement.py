@@ -84,6 +84,20 @@ def put_beside_mesh(rig: ArmatureObject, item: bpy.types.Object) -> None:
     parts.controls_there(rig).location = place + Vector((_GAP * _width(rig), 0.0, 0.0))
 
 
+def put_clear_of(rig: ArmatureObject, item: bpy.types.Object) -> None:
+    """Move a new face to the right where it would stand in an object that is no face.
+
+    Args:
+        rig: the deforming armature.
+        item: the object.
+    """
+    spot, width = parts.controls_there(rig).location, _width(rig)
+    left = spot.x + min((c[0] for m in parts.meshes_of(rig) for c in m.bound_box), default=0.0)
+    across = [(item.matrix_world @ Vector(corner)).x for corner in item.bound_box]
+    if left < max(across) and left + width > min(across):
+        spot.x += max(across) - left + (_GAP - 1.0) * width
+
+
 def _taken(there: Iterable[Vector], spot: Vector, shift: float, reach: float) -> bool:
     return any((at - spot - Vector((shift, 0.0, 0.0))).length < reach for at in there)
 

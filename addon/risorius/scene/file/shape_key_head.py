@@ -130,34 +130,67 @@ def _axes(context: Context) -> Doubles:
     return axes * 100.0 * context.scene.unit_settings.scale_length
 
 
-def part_of(
-    context: Context, item: MeshObject, head: MeshObject, *, with_keys: bool = True
-) -> native.HeadPart:
+def part_at_rest(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
+    """A mesh as its first key has it, without shapes; what a Mirror modifier adds is in it.
+
+    Args:
+        context, item, head: as for part_of.
+    """
+    author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
+    keys, whole = item.data.shape_keys, _mirrored(context, item)
+    mesh = whole if whole is not None else item.data
+    apart = item.matrix_world.translation - head.matrix_world.translation
+    held = keys.reference_key.data if keys is not None and whole is None else mesh.vertices
+    points = np.empty(3 * len(mesh.vertices), np.float32)
+    held.foreach_get("co", points)
+    placed = points.reshape(-1, 3).astype(np.float64) @ turn_of(context, item).T
+    placed += _axes(context) @ np.array(apart, np.float64)
+    out = heads.HeadPart(item.name, author.ObjMesh(placed, *_polygons(mesh)), source=item.name)
+    if whole is not None:
+        bpy.data.meshes.remove(whole)
+    return out
+
+
+def _mirrored(context: Context, item: MeshObject) -> bpy.types.Mesh | None:
+    """A new mesh with what Mirror modifiers add to one; None where there is none of them."""
+    kinds = [modifier.type for modifier in item.modifiers if modifier.show_viewport]
+    if "MIRROR" not in kinds:
+        return None
+    twin = item.copy()
+    for modifier in list(twin.modifiers):
+        if modifier.type != "MIRROR":
+            twin.modifiers.remove(modifier)
+    context.scene.collection.objects.link(twin)
+    seen = twin.evaluated_get(context.evaluated_depsgraph_get())
+    mesh = bpy.data.meshes.new_from_object(seen)
+    bpy.data.objects.remove(twin)
+    return mesh
+
+
+def part_of(context: Context, item: MeshObject, head: MeshObject) -> native.HeadPart:
     """A mesh and its shape keys, in turn_of's space, seen from where the head is.
 
     Args:
         context: the scene says what a unit is.
         item: the mesh.
         head: the mesh that is the face.
-        with_keys: False: the mesh as its first key has it, without shapes.
 
     Raises:
         HeadError: the keys are not relative.
     """
+    if item.data.shape_keys is None:
+        return part_at_rest(context, item, head)
     author, heads = native.part("author.input.obj"), native.part("author.heads.parts")
     turn = turn_of(context, item)
     apart = item.matrix_world.translation - head.matrix_world.translation
     shift = _axes(context) @ np.array(apart, np.float64)
 
-    def points(key: bpy.types.ShapeKey | None) -> Doubles:
+    def points(key: bpy.types.ShapeKey) -> Doubles:
         out = np.empty(3 * len(item.data.vertices), np.float32)
-        (item.data.vertices if key is None else key.data).foreach_get("co", out)
+        key.data.foreach_get("co", out)
         return out.reshape(-1, 3).astype(np.float64) @ turn.T
 
     keys = item.data.shape_keys
-    if keys is None or not with_keys:
-        rest = points(keys.reference_key if keys is not None else None) + shift
-        return heads.HeadPart(item.name, author.ObjMesh(rest, *_polygons(item)), source=item.name)
     if not keys.use_relative:
         raise HeadError(told("The shape keys are not relative: turn on Relative in their panel."))
     cached = {key.name: points(key) for key in keys.key_blocks}
@@ -166,13 +199,12 @@ def part_of(
         for key in keys.key_blocks
         if key != keys.reference_key and not key.mute
     }
-    mesh = author.ObjMesh(cached[keys.reference_key.name] + shift, *_polygons(item))
+    mesh = author.ObjMesh(cached[keys.reference_key.name] + shift, *_polygons(item.data))
     return heads.HeadPart(item.name, mesh, deltas, source=item.name)
 
 
-def _polygons(item: MeshObject) -> tuple[Doubles, list[list[int]], list[list[int]]]:
+def _polygons(mesh: bpy.types.Mesh) -> tuple[Doubles, list[list[int]], list[list[int]]]:
     """Texture coordinates, and by polygon the vertices and the places in these coordinates."""
-    mesh = item.data
     vertices = np.empty(len(mesh.loops), np.int32)
     mesh.loops.foreach_get("vertex_index", vertices)
     starts = np.empty(len(mesh.polygons), np.int32)
@@ -308,8 +340,10 @@ def take_materials(meshes: Sequence[MeshObject], shapes: native.ShapeSet) -> Non
         source.polygons.foreach_get("material_index", index)
         if part.polygons is not None:
             index = index[part.polygons]
-        if not source.materials or len(made.data.polygons) != len(index):
+        count = len(made.data.polygons)
+        if not source.materials or not len(index) or count % len(index):
             continue
+        index = np.tile(index, count // len(index))  # what a Mirror modifier adds
         made.data.materials.clear()
         for material in source.materials:
             made.data.materials.append(material)

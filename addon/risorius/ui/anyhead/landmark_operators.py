@@ -80,7 +80,7 @@ class RISORIUS_OT_find_landmarks(RunsBeside, OfHead, Operator):
         return self.begin(context, task)
 
     def finish(self, context: Context) -> Result:
-        """Show what was found; what is missing is said by name."""
+        """Show the landmarks, and report missing ones by name."""
         found, error = self._task.result, self._task.error
         if error is not None and not isinstance(error, native.user_errors()):
             raise error
@@ -110,6 +110,7 @@ def show_found(
         found: of finding.find.
     """
     points.show(context, head, found.places)
+    hide_lines(context)
     for sentence in found.notes[:5]:
         operator.report({"INFO"}, words.local(sentence))
     missing = [name for name in found.missing if name not in points.of(head)]
@@ -119,6 +120,19 @@ def show_found(
         return
     text = "{count} landmarks found"
     operator.report({"INFO"}, words.say(text, count=len(found.places)))
+
+
+def hide_lines(context: Context) -> None:
+    """Let the 3D views of the window draw no lines from landmarks to the origin of their head.
+
+    Args:
+        context: without a window nothing happens.
+    """
+    screen = context.window.screen if context.window is not None else None
+    for area in screen.areas if screen is not None else ():
+        if area.type == "VIEW_3D":
+            space = cast(bpy.types.SpaceView3D, area.spaces.active)
+            space.overlay.show_relationship_lines = False
 
 
 class RISORIUS_OT_place_landmark(OfHead, Operator):
@@ -262,7 +276,7 @@ class RISORIUS_OT_save_landmarks(_OfLandmarks, Operator, ExportHelper):
 
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.filepath:
-            self.filepath = proposed_file(head_there(context).name, ".json")
+            self.filepath = proposed_file(head_there(context).name, ".landmarks.json")
         return ExportHelper.invoke(self, context, event)
 
     def execute(self, context: Context) -> Result:

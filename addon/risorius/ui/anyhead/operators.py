@@ -15,16 +15,18 @@ from ...logic.base.errors import FaceError
 from ...logic.base.sentences import told
 from ...scene.anyhead import finding, heads, making, points
 from ...scene.base import parts, saved
-from ...scene.base.blender_types import MeshObject
-from ...scene.character import build, runtime
+from ...scene.base.blender_types import ArmatureObject, MeshObject
+from ...scene.character import build, rig_placement, runtime
 from ...scene.file import shape_key_head
+from ...scene.frame import evaluate
 from .. import words
 from ..background_work import RunsBeside
 from ..blender_types import Context, ExportHelper, Menu, Operator, Result
 from ..common import explain, proposed_file, system_path
+from ..file import framing
 from ..file.import_operators import import_character
 from ..file.rig_operators import MadeFace, show_made
-from .landmark_operators import OfHead, head_there
+from .landmark_operators import OfHead, head_there, hide_lines
 
 TEMPLATES = [
     ("SAMPLE", "Sample Man", "The man who came with Risorius"),
@@ -38,7 +40,7 @@ _STAGES = {
 
 
 class _Makes(RunsBeside, OfHead, ExportHelper):
-    """What both ways from a head to a face share."""
+    """Base of the operators that make a face from a head."""
 
     filename_ext = ".dna"
 
@@ -90,7 +92,7 @@ class _Makes(RunsBeside, OfHead, ExportHelper):
         return self._show(context)
 
     def _said(self, error: Exception) -> str:
-        """A sentence; those of the head and of the other face name these themselves."""
+        """The sentence of an error. Errors of the package name the head or the template."""
         if isinstance(error, OSError):
             return explain(error.filename or self.filepath, error)
         return words.of_error(error)
@@ -146,13 +148,14 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         return making.rig_task(head, self._template(context), transfer, wishes)
 
     def _template(self, context: Context) -> making.Template:
-        """Who lends the expressions.
+        """The face with the expressions.
 
         Raises:
             FaceError: there is no such face.
         """
         if self.template == "FACE":
-            return making.Template(runtime.there(heads.face_there(context)).dna)
+            rig = heads.face_there(context)
+            return making.Template(runtime.there(rig).dna, _source(rig))
         if self.template == "FILE":
             if not self.template_file:
                 raise FaceError(told("Choose the DNA file that lends its expressions."))
@@ -167,6 +170,7 @@ class RISORIUS_OT_make_rig_from_head(_Makes, Operator):
         head = bpy.data.objects.get(self._head)
         if head is not None and head.type == "MESH":
             points.show(context, cast(MeshObject, head), made.finding.places)
+            hide_lines(context)
         face = MadeFace(self._head, made.shapes, *made.rigged)
         return show_made(self, context, self.filepath, face, with_materials=True)
 
@@ -201,7 +205,7 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
     def _begin(self, context: Context, head: finding.Head) -> making.HeadTask:
         rig = heads.face_there(context)
-        source = bpy.path.abspath(saved.text(rig, parts.SOURCE))
+        source = _source(rig)
         if source and Path(source).resolve() == Path(self.filepath).resolve():
             raise FaceError(told("This is the face's own file: choose another name."))
         template = making.Template(runtime.there(rig).dna, source)
@@ -209,7 +213,13 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
 
     def _show(self, context: Context) -> Result:
         notes = cast("list[str]", self._task.result)
-        done = import_character(self, context, self.filepath, build.BuildOptions(), show=True)
+        done = import_character(self, context, self.filepath, build.BuildOptions())
+        rig, head = parts.active_rig(context), bpy.data.objects.get(self._head)
+        if done == {"FINISHED"} and rig is not None and head is not None:
+            rig_placement.put_clear_of(rig, head)
+            evaluate.bring_up(context, rig)
+            if not bpy.app.background:
+                framing.frame(context, rig)
         for sentence in notes[:5]:
             self.report({"INFO"}, sentence)
         return done
@@ -222,6 +232,11 @@ class RISORIUS_OT_conform_face(_Makes, Operator):
         if rig is not None:
             words.write(layout, words.say("{name} takes its form.", name=parts.title_of(rig)))
         layout.prop(self, "use_family")
+
+
+def _source(rig: ArmatureObject) -> str:
+    """The file that a face came from, which may be gone; "": none."""
+    return bpy.path.abspath(saved.text(rig, parts.SOURCE))
 
 
 def draw_from_head(self: Menu, _context: Context) -> None:

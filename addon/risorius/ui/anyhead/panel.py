@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The panel Face from Head: which landmarks a head has, which it lacks, and what can be made."""
+"""The panel Face from Head: the landmarks of a head, and buttons that make a face from it."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ..blender_types import Context, Panel, UILayout
 from ..common import FacePanel
 
 _LEAST = 200  # polygons; a cube is no head
-_MOST = 8  # lines of a list
+_MOST = 5  # missing landmarks with their buttons; the next follow when these are placed
 
 
 class RISORIUS_PT_head(FacePanel, Panel):
     bl_idname = "RISORIUS_PT_head"
     bl_label = "Face from Head"
-    bl_order = 1
+    bl_order = 0  # a selected head comes before the controls of a face
 
     @classmethod
     def poll(cls, context: Context) -> bool:
@@ -68,11 +68,11 @@ def _draw_points(layout: UILayout, there: Mapping[str, points.Point]) -> None:
     box = layout.box()
     words.show(box, words.say("{count} missing", count=len(missing)), "ERROR")
     for name in missing[:_MOST]:
+        words.write(box, finding.words()[name])
         line = box.row(align=True)
-        words.show(line, words.say(finding.words()[name]))
-        button = line.operator("risorius.place_landmark", text="", icon="EYEDROPPER")
+        button = line.operator("risorius.place_landmark", text="By Click", icon="EYEDROPPER")
         button.landmark, button.way = name, "CLICK"
-        button = line.operator("risorius.place_landmark", text="", icon="PIVOT_CURSOR")
+        button = line.operator("risorius.place_landmark", text="At Cursor", icon="PIVOT_CURSOR")
         button.landmark, button.way = name, "CURSOR"
 
 

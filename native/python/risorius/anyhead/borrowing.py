@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The materials of what a head gets from a template: eyes, teeth and lashes keep their textures."""
+"""Materials of template meshes: eyes, teeth and lashes of a template keep their textures."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _MOST_BYTES = 1 << 28  # of a picture
 def lend_materials(
     parts: Sequence[FacePart], template: Dna, path: Path, own: Collection[str]
 ) -> None:
-    """Give the parts of a face that are a template's the materials that they have there.
+    """Give the parts that come from a template their materials of the template.
 
     Args:
-        parts: of the face; those that are the template's have its mesh as their source, and get
-            their material.
-        template: the face that lends.
-        path: of its file, beside which its textures lie; what is missing is left out.
-        own: sources of the head's own meshes, whatever a template's are called.
+        parts: of the face; `source` of a part that comes from the template is the name of a
+            mesh of the template.
+        template: the face that the parts come from.
+        path: the file of the template. Textures lie beside it; a missing texture is left out.
+        own: sources of the head's own meshes, which may have names of template meshes.
 
     Raises:
         OSError: a texture that is there cannot be read.

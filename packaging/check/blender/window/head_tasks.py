@@ -12,7 +12,7 @@ from file_tasks import FACES
 from hand import Hand, difference
 from menus import save_as, search
 
-LONG = 600.0  # seconds: the machine may have other work
+LONG = 1800.0  # seconds: the machine may have other work
 
 
 def plain_head(hand: Hand, _dna: Path) -> Iterator[Check]:
