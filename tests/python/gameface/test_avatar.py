@@ -151,6 +151,11 @@ def test_a_made_up_body_leaves_the_face_where_it_is(face, tmp_path):
     plain, tall = GlbFile(plain.read_bytes()), GlbFile(tall.read_bytes())
     for mesh in plain.meshes():
         assert np.abs(tall.positions(mesh) - plain.positions(mesh)).max() < 1e-6
+    skin, world = tall.json["skins"][0], tall._world()
+    inverse = tall.numbers(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
+    turned = [world[joint] for joint in skin["joints"]]
+    assert np.abs(np.array(turned) @ inverse - np.eye(4)).max() < 1e-6
+    assert max(np.abs(matrix[:3, :3] - np.eye(3)).max() for matrix in turned) > 0.9
     nodes = tall.json["nodes"]
     assert nodes[0]["name"] == "Armature"
     names = {node["name"] for node in nodes}

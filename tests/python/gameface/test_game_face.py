@@ -14,12 +14,15 @@ import pytest
 import risorius
 from conftest import GOLDEN, PROJECT, no_room
 from gltf_oracle import GlbFile
+from risorius import importing
 from risorius.cli import main
 from risorius.controls import arkit
 from risorius.files.jpeg import jpeg
 from risorius.files.png import png
-from risorius.gameface import Wishes, export
+from risorius.gameface import Wishes, export, faces
 from risorius.gameface.combining import weight_of
+from risorius.gameface.refining import pose_of
+from risorius.gameface.targets import find_targets
 
 UNITS = list(arkit.mapping())
 HEAD, TEETH = "head_lod0_mesh", "teeth_lod0_mesh"
@@ -193,6 +196,22 @@ def test_refinements_bring_poses_that_are_partly_on_nearer(face, tmp_path, capsy
     assert (code, "curves of ARKit's units were expected" in line) == (1, True), line
     code, line = sentence(capsys, *arguments[1:], "--takes", str(take))
     assert (code, "add --within" in line) == (2, True)
+
+
+def test_poses_of_weights_are_those_of_imported_captures(face, tmp_path):
+    rig, take = risorius.compile_cached(face), tmp_path / "take.csv"
+    targets, _ = find_targets(rig, ["arkit"], "the face")
+    weights = faces.typical([target.name for target in targets], 12)
+    table = [",".join(["time", *(target.name for target in targets)])]
+    table += [",".join(map(str, (i / 30, *row))) for i, row in enumerate(weights)]
+    take.write_text("\n".join(table))
+    clip, _ = importing.import_file(take, rig.raw_control_names, mapping="arkit")
+    rest = np.asarray(rig.initial_raw_controls, np.float32)
+    assert (weights[:, [t.name for t in targets].index("mouthClose")] > 0).any()
+    for row, wanted in zip(weights, clip.curves.T, strict=True):
+        raw = dict(zip(rig.raw_control_names, pose_of(targets, rest, row), strict=True))
+        for name, value in zip(clip.names, wanted, strict=True):
+            assert abs(raw.get(name, value) - value) < 1e-5, name
 
 
 def test_a_size_lowers_textures_then_vertices_then_the_level(face, tmp_path, capsys):

@@ -89,20 +89,9 @@ class Refiner:
         deltas = self._fit(chosen, poses)
         return list(zip(chosen, deltas, strict=True))
 
-    def raw(self, weights: Doubles) -> Floats:
-        """float32[R], the pose of the rig that a capture with such weights is."""
-        raw = self._rest.astype(np.float64)
-        for target, weight in zip(self._targets, weights, strict=True):
-            if weight and target.needs:
-                whole = np.array(weights[self._column[target.needs]])
-                raw += float(share_of(np.array(weight), whole)) * (target.raw - target.base)
-            elif weight:
-                raw += weight * (target.raw - target.base)
-        return np.clip(raw, -1.0, 1.0).astype(np.float32)
-
     def _left(self, weights: Doubles) -> Doubles:
         """float64[P, 3], what sums and pairs leave at a pose."""
-        out = self._points.at(self.raw(weights)) - self._points.rest
+        out = self._points.at(pose_of(self._targets, self._rest, weights)) - self._points.rest
         for weight, delta in zip(weights, self._deltas, strict=True):
             if weight:
                 out -= weight * delta
@@ -190,6 +179,25 @@ class Refiner:
         )
         deltas[np.abs(deltas).max(axis=2) < _LEAST] = 0.0
         return list(deltas.astype(np.float32))
+
+
+def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats:
+    """float32[R], the pose of the rig that a capture with such weights is.
+
+    Args:
+        targets: of ARKit's group.
+        rest: float32[R].
+        weights: float64[targets].
+    """
+    column = {target.name: i for i, target in enumerate(targets)}
+    raw = rest.astype(np.float64)
+    for target, weight in zip(targets, weights, strict=True):
+        if weight and target.needs:
+            whole = np.array(weights[column[target.needs]])
+            raw += float(share_of(np.array(weight), whole)) * (target.raw - target.base)
+        elif weight:
+            raw += weight * (target.raw - target.base)
+    return np.clip(raw, -1.0, 1.0).astype(np.float32)
 
 
 def _farthest(delta: Doubles) -> float:

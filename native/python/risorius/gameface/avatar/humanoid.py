@@ -22,7 +22,7 @@ _TURNS = {
     "arm left": ((0, 1, 0), (0, 0, -1), (-1, 0, 0)),
     "arm right": ((0, -1, 0), (0, 0, -1), (1, 0, 0)),
     "leg": ((-1, 0, 0), (0, -1, 0), (0, 0, 1)),
-    "foot": ((-1, 0, 0), (0, -0.5, 0.866), (0, 0.866, 0.5)),
+    "foot": ((-1, 0, 0), (0, -0.5, 0.75**0.5), (0, 0.75**0.5, 0.5)),
 }
 # bone: parent, Mixamo's name, words in files, is needed, place in heights of the head, turn.
 _Row = tuple[str, str, str, bool, tuple[float, float, float], str]
