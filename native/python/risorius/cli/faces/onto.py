@@ -23,6 +23,7 @@ from ...base.reading import require_regular
 from ...files import fileio
 from ..files import CommandLineError, number
 
+_HEAD_MM = 240.0
 _OWN = (
     "landmarks",
     "strength",
@@ -129,6 +130,8 @@ def spec_of(args: argparse.Namespace) -> Spec:
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
+    if spec.options.tolerance_mm is None:  # a share of the head, and not of the body below it
+        spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
 
 
