@@ -34,6 +34,7 @@ _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
 _SEEN = 0.001  # of the reach: the least delta that is added to a blend shape
 _MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts
 _LARGEST, _FADES = 0.15, 0.5  # of the reach: largest delta of one step, and its fall-off
+_OVERLAP = 1.5  # standard deviations of the gaps: overlap of the lids that the joints aim at
 _LIDS = 1.7  # of the radius of an eye: skin within this distance of its centre is a lid
 
 
@@ -167,7 +168,10 @@ def _farther(face: _Posed, control: int, touch: Touch, change: Change) -> Double
     gaps = _gaps(face, posed, touch, change)
     square = np.einsum("nd,nd->n", way, way)
     share = np.einsum("nd,nd->n", gaps, way) / np.maximum(square, 1e-12 * change.reach**2)
-    if np.median(np.abs(share) * np.sqrt(square)) < _LEAST * change.reach:
+    length = np.sqrt(square)
+    # LODs without blend shapes have the joints alone: lids that overlap are better than a gap.
+    share += _OVERLAP * np.std(share * length) / np.maximum(length, 1e-6 * change.reach)
+    if np.median(np.abs(share) * length) < _LEAST * change.reach:
         return None
     out = np.zeros(len(posed))
     moving = _moving(ways, change)
