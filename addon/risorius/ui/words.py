@@ -8,12 +8,13 @@ import blf
 import bpy
 
 from .. import native
-from ..language import tables
+from ..language import errors, tables
 from ..language.tables import CONTEXT
 from ..logic.base.sentences import Sentence
 from ..scene.base import session
 from .blender_types import Context, Icon, UILayout
 
+_REASONS = ("error", "reason", "said", "trouble", "why")  # values that are error messages
 NAMES = "Names"  # the context of names of things, in which nothing is translated
 _SIDEBAR = 280  # pixels that Blender gives the sidebar at first
 _EDGES = 36  # of them the tabs and the panel's margins
@@ -115,9 +116,18 @@ def say(text: str, **values: object) -> str:
     follow_language()
     if isinstance(text, Sentence):
         return say(text.template, **text.values)
-    values = {name: say(v) if isinstance(v, Sentence) else v for name, v in values.items()}
+    values = {name: _local_value(name, v) for name, v in values.items()}
     local = bpy.app.translations.pgettext_iface(text, CONTEXT) or text
     return local.format(**values) if values else local
+
+
+def _local_value(name: str, value: object) -> object:
+    """A value of a sentence: a Sentence and an error message of the package are translated."""
+    if isinstance(value, Sentence):
+        return say(value)
+    if name in _REASONS and isinstance(value, str):
+        return errors.local(value, _language["given"])
+    return value
 
 
 def name_of_new(text: str) -> str:
@@ -129,7 +139,10 @@ def name_of_new(text: str) -> str:
 def of_error(error: Exception) -> str:
     """The text of an error, translated if it has a Sentence."""
     first = error.args[0] if error.args else ""
-    return say(first) if isinstance(first, Sentence) else str(error)
+    if isinstance(first, Sentence):
+        return say(first)
+    follow_language()
+    return errors.local(str(error), _language["given"])
 
 
 def local(text: str) -> str:
