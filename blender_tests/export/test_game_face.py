@@ -35,3 +35,25 @@ def test_a_level_that_is_not_there_is_one_sentence(dna_file, tmp_path):
     with pytest.raises(RuntimeError, match="a LOD from 0 to .* was expected, found 15"):
         bpy.ops.risorius.export_game_face(filepath=str(path), lod=15)
     assert not path.exists()
+
+
+def test_a_vrm_asks_for_its_licence_and_for_a_body(dna_file, tmp_path):
+    scene.load(dna_file)
+    path = tmp_path / "face.vrm"
+    wished = {"filepath": str(path), "shapes": {"arkit"}, "vrm": "1.0", "body": "minimal"}
+    with pytest.raises(RuntimeError, match="VRM 1.0 asks for name, .* modification"):
+        bpy.ops.risorius.export_game_face(**wished)
+    said = {
+        "title": "Anna", "authors": "A, B", "avatar": "everyone", "violence": "FORBIDDEN",
+        "sexuality": "FORBIDDEN", "commerce": "corporation", "politics": "FORBIDDEN",
+        "hate": "FORBIDDEN", "credit": "required", "redistribution": "ALLOWED",
+        "modification": "allowModification",
+    }  # fmt: skip
+    with pytest.raises(RuntimeError, match="VRM 1.0 asks for creditNotation: say"):
+        bpy.ops.risorius.export_game_face(**{**wished, **said, "credit": "UNSAID"})
+    assert not path.exists()
+    assert bpy.ops.risorius.export_game_face(**wished, **said) == {"FINISHED"}
+    table = _table(path)["extensions"]["VRMC_vrm"]
+    assert table["meta"]["authors"] == ["A", "B"]
+    assert table["meta"]["allowRedistribution"] is True
+    assert "hips" in table["humanoid"]["humanBones"]

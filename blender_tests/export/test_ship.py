@@ -191,6 +191,46 @@ def test_a_face_that_walks_and_a_part_of_the_range(kind, options, dna_file, tmp_
     assert _error(_film(_import(kind, path), frames), wanted) < NEAR[kind]
 
 
+def _fbx_tree(path):
+    """Object -> object above it, and object -> kind of its attribute, as the FBX file says."""
+    from io_scene_fbx import parse_fbx
+
+    root, _version = parse_fbx.parse(str(path))
+    parts = {part.id: part.elems for part in root.elems}
+    called, attributes, above, kinds = {}, {}, {}, {}
+    for item in parts[b"Objects"]:
+        if item.id == b"Model":
+            called[item.props[0]] = item.props[1].split(b"\0")[0].decode()
+        elif item.id == b"NodeAttribute":
+            attributes[item.props[0]] = item.props[2].decode()
+    for _kind, child, parent, *_ in (link.props for link in parts[b"Connections"]):
+        if child in called and parent in called:
+            above[called[child]] = called[parent]
+        elif child in attributes and parent in called:
+            kinds[called[parent]] = attributes[child]
+    return above, kinds
+
+
+def test_an_fbx_holds_coarser_levels_in_groups(dna_file, tmp_path):
+    rig = scene.load(dna_file, lods=(True, True, *[False] * 6))
+    animate(rig)
+    path = _export("FBX", tmp_path, lod_groups=True, lod=0)
+    assert b"LodGroup" in path.read_bytes()
+    shown = [m for m in scene.meshes(rig).values() if 0 in list(m["dna_lods"])]
+    every = [m for m in scene.meshes(rig).values() if {0, 1} & set(m["dna_lods"])]
+    assert len(every) > len(shown)
+    wanted = _film(shown)
+    found = _import("FBX", path)
+    assert len(found) == len(every)
+    above, kinds = _fbx_tree(path)
+    for name in risorius.load(dna_file).mesh_names[: len(every)]:
+        assert above[name] == f"{name.split('_lod')[0]}_LODGroup"
+        assert kinds[above[name]] == "LodGroup"
+    fine = [item for item in found if "_lod0" in item.name]
+    assert _error(_film(fine), wanted) < NEAR["FBX"]
+    assert b"LodGroup" not in _export("FBX", tmp_path).read_bytes()
+
+
 def test_options_of_gltf_reach_the_file(dna_file, tmp_path):
     rig = scene.load(dna_file, lods=(True, True, *[False] * 6))
     animate(rig)

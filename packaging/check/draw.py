@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Draw comments and sentences at random, for readers who judge whether they are clear.
 
-    draw.py SEED OUT    writes OUT/comments.tsv and OUT/sentences.tsv, 100 rows each
+    draw.py SEED OUT    writes OUT/comments.md and OUT/sentences.md, 100 items each
 
-A comment is a docstring or a block of comment lines of C++ or Python. A sentence is one of a
-Markdown page, an interface text or an error message. Each row has a number, the place in the
-project, the name that the text describes, and the text. A reader gets the rows without the code.
+A comment is a docstring or a block of comment lines of C++ or Python. A sentence comes from a
+Markdown page, an interface text or an error message. Each item shows the place in the project and
+the text as its readers see it: a comment with its signature and the docstring of its file, a
+sentence with its paragraph. The code itself is not shown.
 """
 
 import ast
@@ -19,7 +20,8 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
 COUNT = 100
-Row = tuple[str, str, str]  # place, name, text
+Item = tuple[str, str, str, str]  # place, context, name of the described thing, text
+_NOT_PROSE = re.compile(r"SPDX|noqa|type:|NOLINT|clang-format|-{4}")
 
 
 def files(*patterns: str) -> list[Path]:
@@ -33,25 +35,42 @@ def one_line(text: str) -> str:
     return " ".join(text.split())
 
 
-def python_comments(path: Path) -> Iterator[Row]:
+def place_of(path: Path) -> str:
+    """The path of a file in the project, with slashes."""
+    return path.relative_to(PROJECT).as_posix()
+
+
+def python_comments(path: Path) -> Iterator[Item]:
     """Docstrings and comment blocks of a Python file."""
     source = path.read_text(encoding="utf-8")
-    place = path.relative_to(PROJECT).as_posix()
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Module):
-            text = ast.get_docstring(node)
-            if text:
-                yield f"{place}:{getattr(node, 'lineno', 1)}", getattr(node, "name", "module"), text
-    lines = source.splitlines()
-    yield from blocks(place, lines, "#")
+    lines, tree = source.splitlines(), ast.parse(source)
+    about = one_line(ast.get_docstring(tree) or "")
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Module):
+            continue
+        text = ast.get_docstring(node)
+        if text and isinstance(node, ast.Module):
+            yield place_of(path), "", "the file", text
+        elif text:
+            signature = lines[node.lineno - 1 : node.body[0].lineno - 1]
+            yield f"{place_of(path)}:{node.lineno}", about, one_line(" ".join(signature)), text
+    yield from blocks(path, lines, about, "#")
 
 
-def blocks(place: str, lines: list[str], mark: str) -> Iterator[Row]:
-    """Blocks of lines that begin with a comment mark, each with the first line of code after it.
+def cpp_comments(path: Path) -> Iterator[Item]:
+    """Comment blocks of a C++ file; the first one is the context of the others."""
+    found = list(blocks(path, path.read_text(encoding="utf-8").splitlines(), "", "//"))
+    for place, _, name, text in found:
+        yield place, "" if text == found[0][3] else one_line(found[0][3]), name, text
+
+
+def blocks(path: Path, lines: list[str], about: str, mark: str) -> Iterator[Item]:
+    """Blocks of lines that begin with a comment mark, each with the line of code after it.
 
     Args:
-        place: path of the file in the project.
-        lines: of the file.
+        path: file in the project.
+        lines: lines of the file.
+        about: docstring of the file, or "".
         mark: "#" or "//".
     """
     start = None
@@ -60,73 +79,66 @@ def blocks(place: str, lines: list[str], mark: str) -> Iterator[Row]:
         if is_comment and start is None:
             start = number
         if not is_comment and start is not None:
-            text = one_line(" ".join(part.strip().lstrip("/#!<").strip() for part in lines[start:number]))
-            if len(text.split()) > 3 and not re.match(r"SPDX|noqa|type:|NOLINT|clang-format|-{4}", text):
-                yield f"{place}:{start + 1}", one_line(line)[:120], text
+            text = "\n".join(part.strip().lstrip("/#!<").rstrip() for part in lines[start:number])
+            if len(text.split()) > 3 and not _NOT_PROSE.match(text.strip()):
+                yield f"{place_of(path)}:{start + 1}", about, line.strip(), text
             start = None
 
 
-def cpp_comments(path: Path) -> Iterator[Row]:
-    """Comment blocks of a C++ file."""
-    place = path.relative_to(PROJECT).as_posix()
-    yield from blocks(place, path.read_text(encoding="utf-8").splitlines(), "//")
-
-
-def markdown_sentences(path: Path) -> Iterator[Row]:
-    """Sentences of a Markdown page without code blocks, tables and headings."""
-    place = path.relative_to(PROJECT).as_posix()
+def page_sentences(path: Path) -> Iterator[Item]:
+    """Sentences of a Markdown page without its code blocks, tables and headings."""
     text = re.sub(r"```.*?```", "", path.read_text(encoding="utf-8"), flags=re.S)
     heading = path.stem
     for paragraph in re.split(r"\n\s*\n|\n(?=\s*[-*\d]+\.? )", text):
         if paragraph.lstrip().startswith("#"):
             heading = paragraph.strip().splitlines()[0].lstrip("# ")
-            continue
-        if "|" in paragraph:
-            continue
-        for sentence in re.split(r"(?<=[.!?])\s+(?=[A-Z*`\[])", one_line(paragraph)):
-            if len(sentence.split()) > 3 and not sentence.startswith("!["):
-                yield place, heading, sentence
+        elif "|" not in paragraph:
+            whole = one_line(paragraph)
+            for sentence in re.split(r"(?<=[.!?])\s+(?=[A-Z*`\[])", whole):
+                if len(sentence.split()) > 3 and not sentence.startswith("!["):
+                    yield place_of(path), whole, heading, sentence
 
 
-def interface_sentences() -> Iterator[Row]:
-    """Tooltips and labels, which the German table lists, and error messages of both packages."""
+def interface_sentences() -> Iterator[Item]:
+    """Tooltips and labels, which the German table lists, and error messages of the packages."""
     table = PROJECT / "addon/risorius/language/interface_de.toml"
-    for text in _texts(tomllib.loads(table.read_text(encoding="utf-8"))):
-        if len(text.split()) > 3:
-            yield "interface", "tooltip, label or report in Blender", one_line(text)
-    for path in files("addon/*.py", "native/python/*.py", "people/*.py"):
+    for texts in tomllib.loads(table.read_text(encoding="utf-8")).values():
+        for text in texts:
+            if len(text.split()) > 3:
+                yield "interface", "", "label, tooltip or report in Blender", text
+    for path in files("addon/*.py", "native/python/*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
                 text = _literal(node.exc.args[-1])
                 if len(text.split()) > 3:
-                    place = f"{path.relative_to(PROJECT).as_posix()}:{node.lineno}"
-                    yield place, "error message", one_line(text)
-
-
-def _texts(table: dict[str, object]) -> Iterator[str]:
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _texts(value)
-        else:
-            yield key
+                    yield f"{place_of(path)}:{node.lineno}", "", "error message", text
 
 
 def _literal(node: ast.expr) -> str:
-    """The text of a message; a value that is filled in stands as its expression in braces."""
+    """The text of a message; a value that is filled in appears as its expression in braces."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return node.value
-    if isinstance(node, ast.JoinedStr):
-        parts = [_literal(v) if isinstance(v, ast.Constant) else "{" + ast.unparse(v.value) + "}" for v in node.values]
-        return "".join(parts)
-    return ""
+    if not isinstance(node, ast.JoinedStr):
+        return ""
+    return "".join(
+        "{" + ast.unparse(part.value) + "}"
+        if isinstance(part, ast.FormattedValue)
+        else _literal(part)
+        for part in node.values
+    )
 
 
-def write(path: Path, rows: list[Row], chosen: random.Random) -> None:
-    """Write the drawn rows as a table with tabs between the columns."""
-    drawn = chosen.sample(sorted(set(rows)), COUNT)
-    lines = [f"{number}\t{place}\t{one_line(name)}\t{one_line(text)}" for number, (place, name, text) in enumerate(drawn, 1)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    print(f"{path}: {COUNT} of {len(set(rows))}")
+def write(path: Path, items: list[Item], chosen: random.Random) -> None:
+    """Write the drawn items as a Markdown list."""
+    every = sorted(set(items))
+    parts = []
+    for number, (place, context, name, text) in enumerate(chosen.sample(every, COUNT), 1):
+        shown = [f"## {number}. {place}", f"describes: {name}"]
+        if context and context != text:
+            shown.append(f"context: {context}")
+        parts.append("\n".join([*shown, "", text.strip(), ""]))
+    path.write_text("\n".join(parts), encoding="utf-8")
+    print(f"{path}: {COUNT} of {len(every)}")
 
 
 def main() -> int:
@@ -136,12 +148,11 @@ def main() -> int:
         return 2
     chosen, out = random.Random(int(sys.argv[1])), Path(sys.argv[2])
     out.mkdir(parents=True, exist_ok=True)
-    comments = [row for path in files("*.py") for row in python_comments(path)]
-    comments += [row for path in files("*.h", "*.cpp") for row in cpp_comments(path)]
-    sentences = [row for path in files("*.md") for row in markdown_sentences(path)]
-    sentences += list(interface_sentences())
-    write(out / "comments.tsv", comments, chosen)
-    write(out / "sentences.tsv", sentences, chosen)
+    comments = [item for path in files("*.py") for item in python_comments(path)]
+    comments += [item for path in files("*.h", "*.cpp") for item in cpp_comments(path)]
+    sentences = [item for path in files("*.md") for item in page_sentences(path)]
+    write(out / "comments.md", comments, chosen)
+    write(out / "sentences.md", sentences + list(interface_sentences()), chosen)
     return 0
 
 

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# gameface.sh [TAKE.csv]: what `risorius export` makes of the sample person, in three.js (npm) in Debian's
-# chromium and under Khronos' gltf-validator (npm): see gameface/check.py. Without a take of Live Link Face,
-# or ../shared/data/real, its part says NOT RUN. Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code
+# gameface.sh [TAKE.csv [VOICE.wav]]: what `risorius export` makes of the sample person, in three.js,
+# three-vrm and TalkingHead (npm) in Debian's chromium, under Khronos' gltf-validator (npm) and in Blender's
+# reader of VRM (bpy-vrm-format of PyPI): see gameface/check*.py. Without a take of Live Link Face and a
+# voice with its transcript, or ../shared/data/real, their parts say NOT RUN. Prints rows `row<TAB>name<TAB>passed<TAB>failed`; exit code
 # 0 only if nothing failed.
 set -uo pipefail
 source "$(dirname "$0")/../setup.sh"
@@ -12,10 +13,12 @@ out="$project/build/gameface"
 logs="$project/build/logs/gameface"
 here="$project/packaging/ship/gameface"
 take="${1:-$project/../shared/data/real/livelink/rom_134s.csv}"
+voice="${2:-$project/../shared/data/real/speech/austen-0870.wav}"
 face="$project/build/sample/man.dna"
+reader=bpy-vrm-format==4.10.2
 
 get_tools() {
-  mkdir -p "$out" && cp "$here"/package*.json "$here/validate.mjs" "$here/page.html" \
+  mkdir -p "$out" && cp "$here"/package*.json "$here"/*.mjs "$here"/*.html "$here/places.js" \
     "$project/native/python/risorius/gameface/combinations.js" "$out/" &&
     (cd "$out" && npm ci --silent --no-audit --no-fund) || return 1
   [ -e "$face" ] || { face="$out/sample.dna" && "$project/.venv/bin/risorius" sample build "$face"; }
@@ -26,11 +29,27 @@ step "tools"
 works "game face, tools" tools get_tools || exit 1
 [ -e "$face" ] || face="$out/sample.dna"
 step "chromium"
-[ -e "$take" ] && set -- "$take" || set --
+rm -f "$out/targets.tsv"
+set --
+[ -e "$take" ] && set -- "$take"
+[ -e "$take" ] && [ -e "$voice" ] && set -- "$take" "$voice"
 works "game face in three.js, targets and sums" check "$python" "$here/check.py" "$out" "$face" "$@"
 cat "$logs/check.log"
+works "game face in three-vrm" vrm "$python" "$here/check_vrm.py" "$out" "$face" "$@"
+cat "$logs/vrm.log"
+works "game face in TalkingHead" talk "$python" "$here/check_talk.py" "$out" "$face" "$@"
+cat "$logs/talk.log"
+step "VRM in Blender"
+if "$python" -c "import bpy, os; os._exit(0)" 2>/dev/null; then
+  "$python" -m pip install -q --no-deps --target "$out/reader" "$reader" >"$logs/reader.log" 2>&1
+  works "game face, VRM in Blender" blender "$python" "$here/in_blender.py" "$out/reader" \
+    "$out/new.vrm" "$out/old.vrm"
+  grep "expressions" "$logs/blender.log"
+else
+  echo "NOT RUN: no bpy"
+fi
 step "gltf-validator"
-works "game face, gltf-validator" validator node "$out/validate.mjs" "$out"/*.glb
+works "game face, gltf-validator" validator node "$out/validate.mjs" "$out"/*.glb "$out"/*.vrm
 cat "$logs/validator.log"
 step ""
 [ $failed -eq 0 ]

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
 """How exactly a template is laid onto heads of which the true places are known.
 
-    python tests/bench/any_head.py [--heads 6] [--first 100] [--marks 2.5]
+    python tests/bench/any_head.py [--heads 6] [--first 100] [--marks 2.5] [--kind plain]
 
 Draws people of the sample's generator, whose vertices all correspond, gives each other vertices
-and lays the man onto them. What a head has besides is told by the kind: `plain`; `noise` (0.12 mm
-and holes at the back of the head); `fine` (four times the triangles); `dressed` (hair and a collar
-around the head). Pairs are the true places of eleven vertices with an error of --marks
-millimetres. Prints a row for each head: millimetres along the surface and away from it, and
-seconds; and the means.
+and lays the man onto them. The kinds of heads: `plain`; `noise` (0.12 mm and holes at the back of
+the head); `fine` (four times the triangles); `dressed` (hair and a collar around the head).
+Landmarks and the start are found as for any head; with --marks, pairs are the true places of
+eleven vertices with an error of so many millimetres, without a start. Prints a row for each head:
+millimetres along the surface and away from it, and seconds; and the means.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python" / "support"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 
 import any_heads
+from risorius.anyhead.landmarks.find import find_form
+from risorius.anyhead.landmarks.start import pairs_of, start_of
 from risorius.anyhead.registration import register
 from risorius.anyhead.surface import Surface
 from risorius_people.people import MAN
@@ -77,13 +79,26 @@ def marks_of(skin: Surface) -> list[int]:
     return [int(np.linalg.norm(points - p, axis=1).argmin()) for p in wanted]
 
 
-def measured(template: Surface, true: Surface, target: Surface, marks: float, seed: int) -> list:
-    """The row of one head: COLUMNS."""
+def measured(
+    template: Surface, true: Surface, target: Surface, marks: float | None, seed: int
+) -> list[float]:
+    """The row of one head: COLUMNS.
+
+    Args:
+        marks: error of pairs at true places, mm; None: landmarks are found.
+    """
     random = np.random.default_rng(seed)
     chosen = marks_of(template)
-    pairs = [(v, true.points[v] + random.normal(0, marks / MM / np.sqrt(3), 3)) for v in chosen]
     begin = time.perf_counter()
-    found = register(template, target, pairs)
+    if marks is None:
+        one, other = find_form(template), find_form(target)
+        start = start_of(template, target, one, other)
+        found = register(template, target, pairs_of(template, one, other), start=start)
+    else:
+        wrong = random.normal(0, marks / MM / np.sqrt(3), (len(chosen), 3))
+        found = register(
+            template, target, list(zip(chosen, true.points[chosen] + wrong, strict=True))
+        )
     seconds = time.perf_counter() - begin
     along = MM * any_heads.errors(template, found.points, true.points)
     on = found.trusted
@@ -100,7 +115,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--heads", type=int, default=6)
     parser.add_argument("--first", type=int, default=100, help="seed of the first head")
-    parser.add_argument("--marks", type=float, default=2.5, help="error of pairs, mm")
+    parser.add_argument("--marks", type=float, help="error of pairs at true places, mm")
+    parser.add_argument("--kind", choices=KINDS, help="of all heads")
     args = parser.parse_args()
     source = any_heads.generator()
     template = any_heads.skin_of(MAN, source)
@@ -108,7 +124,7 @@ def main() -> None:
     print("seed  kind     vertices", *(f"{name:>8}" for name in COLUMNS))
     rows = []
     for i in range(args.heads):
-        seed, kind = args.first + i, KINDS[i % len(KINDS)]
+        seed, kind = args.first + i, args.kind or KINDS[i % len(KINDS)]
         true = any_heads.skin_of(any_heads.random_person(seed, source), source)
         target = target_of(kind, true, seed)
         rows.append(measured(template, true, target, args.marks, seed))

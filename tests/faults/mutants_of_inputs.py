@@ -274,6 +274,10 @@ TRIALS: dict[str, tuple[list[str], str]] = {
     "web": (["face.dna", "take.csv", "voice.wav"], "web face.dna -o OUT.html --clip take.csv "
             "--sound voice.wav --lods 0:1"),
     "export": (["face.dna"], "export face.dna -o OUT.glb --shapes all --quantize --within 1"),
+    "export vrm": (["licence.toml", "face.dna"], "export face.dna -o OUT.vrm --shapes all --vrm "
+                   "1.0 --humanoid minimal --licence licence.toml"),
+    "export takes": (["take.csv"], "export face.dna -o OUT.glb --shapes all --within 1 --takes "
+                     "FILE"),
     "plot": (["core.dna", "face.dna"], "plot FILE -o OUT.png --dpi 40"),
     "bench": (["frames.npz"], "bench core.dna --frames frames.npz --quick"),
 }  # fmt: skip

@@ -150,6 +150,11 @@ def make_inputs(folder: Path) -> dict[str, bytes]:
         "person.toml": b'like = "man"\nname = "own"\nage = 30\nskin = [0.5, 0.4, 0.3]\n'
         b"muscle = 0.5\n[origin]\ncaucasian = 0.5\nafrican = 0.5\n[features]\n",
         "rig.toml": b"[joints]\ncount = 9\nrounds = 3\n[lods]\ncount = 2\n[correctives]\nmost = 2",
+        "licence.toml": b'name = "Anna"\nauthors = ["Somebody"]\navatarPermission = "everyone"\n'
+        b'allowExcessivelyViolentUsage = false\nallowExcessivelySexualUsage = false\n'
+        b'commercialUsage = "corporation"\nallowPoliticalOrReligiousUsage = false\n'
+        b'allowAntisocialOrHateUsage = false\ncreditNotation = "required"\n'
+        b'allowRedistribution = true\nmodification = "prohibited"\n',
         "regions.json": json.dumps({"a": dna.joint_names[:2], "b": [2]}).encode(),
         "frames.npz": _npz(vertices=np.repeat(positions[None], 3, axis=0).astype("<f4"), rate=30.0),
         "voice.wav": _wav(),

@@ -42,7 +42,7 @@ Ball ball(std::uint32_t rows, std::uint32_t columns, double nose) {
 
 std::vector<Pair> pairs(const Ball& of, double nose) {
   std::vector<Pair> out;
-  for (std::uint32_t v = 5; v < of.directions.size(); v += 97) {
+  for (std::uint32_t v = 5; v < of.directions.size(); v += 29) {
     out.push_back({v, place(of.directions[v], nose), 1.0});
   }
   return out;

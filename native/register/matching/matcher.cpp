@@ -17,8 +17,11 @@ constexpr double kLeastRobust = 1.0;  // mm
 constexpr double kOutside = 2.5;      // times the median distance
 constexpr double kLeastCosine = 0.2;  // between normals of a match by features
 constexpr double kBackwards = 0.5;    // weight of the matches of the target
-constexpr double kRimReach = 25.0;    // mm to a border of the target
-constexpr std::size_t kEach = 3;      // of so many samples one looks for its vertex
+constexpr double kInside = 0.3;       // belief in a match of a hidden vertex
+constexpr double kInsideReach = 2.0;  // mm
+constexpr double kInsideCosine = 0.8;
+constexpr double kRimReach = 25.0;  // mm to a border of the target
+constexpr std::size_t kEach = 3;    // of so many samples one looks for its vertex
 
 Feature feature(const Vec3& point, const Vec3& normal, const Bend& bend, const Counting& counting) {
   Feature out{};
@@ -44,6 +47,11 @@ double median(std::vector<double> values) {
 }
 
 }  // namespace
+
+bool Matcher::is_inside(const Closest& found, const Vec3& normal) {
+  return found.triangle >= 0 && found.distance < kInsideReach &&
+         found.normal.dot(normal) > kInsideCosine;
+}
 
 Matcher::Matcher(const Target& target, const Looks& looks, std::size_t threads)
     : target_(target),
@@ -190,9 +198,13 @@ std::vector<Match> Matcher::by_distance(const Points& points, const Points& norm
   const std::vector<Closest> found = closest(points, normals, farthest, least_cosine);
   std::vector<Match> matches(points.size());
   for (std::size_t v = 0; v < points.size(); ++v) {
-    if (looks_.belief[v] <= 0 || found[v].triangle < 0 || found[v].beyond_border) continue;
-    matches[v] = {found[v].point, found[v].normal,
-                  looks_.belief[v] * trust(found[v].distance, robust), along};
+    if (found[v].triangle < 0 || found[v].beyond_border) continue;
+    double belief = looks_.belief[v] * trust(found[v].distance, robust);
+    if (is_inside(found[v], normals[v])) {
+      belief =
+          std::max(belief, kInside * looks_.inside[v] * trust(found[v].distance, kInsideReach / 2));
+    }
+    matches[v] = {found[v].point, found[v].normal, belief, along};
   }
   rims_.match(looks_.rim, points, normals, farthest, matches);
   return matches;

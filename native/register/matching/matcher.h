@@ -22,6 +22,7 @@ struct Target {
 struct Looks {
   std::vector<Bend> bends;           // [V]
   std::vector<double> belief;        // [V] 0: has no counterpart, 1: has one
+  std::vector<double> inside;        // [V] 1: hidden in a cavity, which the target may have too
   std::vector<std::uint8_t> border;  // [V] not 0: on the border of the template
   std::vector<RimEdge> rim;          // the edges of that border
 };
@@ -54,6 +55,8 @@ class Matcher {
   };
   std::vector<Closest> closest(const Points& points, const Points& normals, double farthest,
                                double least_cosine) const;
+  /// Whether a vertex in a cavity lies on a surface so near and so parallel that it is the same.
+  static bool is_inside(const Closest& found, const Vec3& normal);
   /// [V] by closest points. In: robust  mm, a distance at which a match counts a quarter
   std::vector<Match> by_distance(const Points& points, const Points& normals, double farthest,
                                  double least_cosine, double robust, double along) const;

@@ -16,12 +16,13 @@ using core::fail;
 
 namespace {
 
-constexpr double kAround = 60.0;                // mm around the start that count of the target
-constexpr std::size_t kSamples = 40000;         // of the target
-constexpr double kCloser = 1.2;                 // mm between samples at least
-constexpr int kRays = 16;                       // that tell whether a vertex is hidden
-constexpr double kHidden = 0.12, kShown = 0.3;  // shares of rays that meet nothing
-constexpr int kRounds = 12;                     // of robust alignment
+constexpr double kAround = 60.0;                    // mm around the start that count of the target
+constexpr std::size_t kSamples = 40000;             // of the target
+constexpr double kCloser = 1.2;                     // mm between samples at least
+constexpr double kLeastSize = 10, kMostSize = 1e5;  // mm, of templates
+constexpr int kRays = 16;                           // that tell whether a vertex is hidden
+constexpr double kHidden = 0.12, kShown = 0.3;      // shares of rays that meet nothing
+constexpr int kRounds = 12;                         // of robust alignment
 
 std::string place(const char* name, std::size_t i) {
   return std::string(name) + "[" + std::to_string(i) + "]";
@@ -226,7 +227,7 @@ core::Result<std::vector<Vector3>> aligned(const Mesh& templ, const std::vector<
   return out;
 }
 
-Scale scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm) {
+core::Result<Scale> scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm) {
   const auto spread = [](const std::vector<Vector3>& points, Vec3& middle) {
     middle.setZero();
     for (const Vector3& p : points) middle += vec(p);
@@ -238,7 +239,16 @@ Scale scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm) 
   Scale scale;
   Vec3 own;
   const double before = spread(templ.points, own), after = spread(start, scale.origin);
-  scale.mm = after > 0 && before > 0 ? mm * before / after : mm;
+  if (!(before * mm > kLeastSize) || !(before * mm < kMostSize)) {
+    return fail(ErrorCode::kInvalidArgument, "mm",
+                "a template of 10 mm to 100 m was expected, found one whose vertices lie " +
+                    std::to_string(before * mm) + " mm from their middle");
+  }
+  if (!(after > 0)) {
+    return fail(ErrorCode::kInvalidArgument, "start",
+                "vertices at more than one place were expected");
+  }
+  scale.mm = mm * before / after;
   return scale;
 }
 
@@ -289,8 +299,8 @@ core::Result<Target> near_target(const Mesh& target, const Points& start, const 
     const Points& p = out.form.points;
     area += (p[t[1]] - p[t[0]]).cross(p[t[2]] - p[t[0]]).norm() / 2;
   }
-  const auto most = static_cast<std::size_t>(area / (kCloser * kCloser)) + 1;
-  out.samples = sample(out.form, out.borders, std::min(kSamples, most));
+  const double most = std::min(area / (kCloser * kCloser) + 1, static_cast<double>(kSamples));
+  out.samples = sample(out.form, out.borders, static_cast<std::size_t>(most));
   out.samples.bends = bends(out.samples.points, out.samples.normals, out.samples, threads);
   return out;
 }
@@ -310,10 +320,11 @@ Looks looks_of(const Form& start, const std::vector<std::uint8_t>& trusted, doub
     }
   }
   looks.rim = rim_edges(start, borders);
-  const auto count = std::clamp<std::size_t>(static_cast<std::size_t>(area / (spacing * spacing)),
-                                             100, 2 * kSamples);
+  const auto count = static_cast<std::size_t>(
+      std::clamp(area / (spacing * spacing), 100.0, 2.0 * static_cast<double>(kSamples)));
   looks.bends = bends(start.points, start.normals, sample(start, borders, count), threads);
   looks.belief.assign(start.points.size(), 1.0);
+  looks.inside.assign(start.points.size(), 0.0);
   if (!trusted.empty()) {
     for (std::size_t v = 0; v < trusted.size(); ++v) looks.belief[v] = trusted[v] != 0 ? 1.0 : 0.0;
     return looks;
@@ -325,6 +336,7 @@ Looks looks_of(const Form& start, const std::vector<std::uint8_t>& trusted, doub
         for (std::size_t v = begin; v < end; ++v) {
           const double open = openness(own, start.points[v], start.normals[v]);
           looks.belief[v] = std::clamp((open - kHidden) / (kShown - kHidden), 0.0, 1.0);
+          looks.inside[v] = 1 - looks.belief[v];
         }
       },
       8);

@@ -24,7 +24,8 @@ core::Status check(const Mesh& templ, const Mesh& target, const std::vector<Pair
 /// pair that disagrees with most counts little.
 /// Fails: kInvalidArgument (pairs that lie on a line)
 core::Result<std::vector<Vector3>> aligned(const Mesh& templ, const std::vector<Pair>& pairs);
-Scale scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm);
+/// Fails: kInvalidArgument (a template or a start of no size)
+core::Result<Scale> scale_of(const Mesh& templ, const std::vector<Vector3>& start, double mm);
 /// What of the target lies near the start, without triangles that have no area, and the triangles
 /// of the whole target that these are. Fails: kInvalidArgument (too little of it is there)
 core::Result<Target> near_target(const Mesh& target, const Points& start, const Scale& scale,

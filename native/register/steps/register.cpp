@@ -164,8 +164,9 @@ Registered told(const Points& points, const Mesh& templ, const steps::Matcher& m
                                               : whole[static_cast<std::size_t>(found.triangle)]);
     out.shares.push_back({found.shares[0], found.shares[1], found.shares[2]});
     out.distance.push_back(found.distance / scale.mm);
-    out.trusted.push_back(same && looks.belief[v] > 0 && found.distance < kFound &&
-                          !found.beyond_border);
+    const bool has = looks.belief[v] > 0 ||
+                     (looks.inside[v] > 0 && steps::Matcher::is_inside(found, normals[v]));
+    out.trusted.push_back(same && has && found.distance < kFound && !found.beyond_border);
   }
   return out;
 }
@@ -184,7 +185,9 @@ core::Result<Registered> register_surface(const Mesh& templ, const Mesh& target,
     if (!made) return std::move(made).propagate();
     begin = std::move(made).value();
   }
-  const steps::Scale scale = steps::scale_of(templ, begin, options.mm);
+  auto measure = steps::scale_of(templ, begin, options.mm);
+  if (!measure) return std::move(measure).propagate();
+  const steps::Scale scale = measure.value();
   steps::Form form;
   for (const Vector3& p : begin) form.points.push_back(scale.in(p));
   form.triangles = templ.triangles;

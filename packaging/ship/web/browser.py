@@ -88,6 +88,7 @@ async def browser() -> AsyncIterator[Browser]:
         process = await asyncio.create_subprocess_exec(
             program, "--headless=new", "--no-sandbox", "--use-angle=swiftshader",
             "--enable-unsafe-swiftshader", "--no-first-run", "--hide-scrollbars",
+            "--autoplay-policy=no-user-gesture-required", "--mute-audio",
             "--disable-background-networking", f"--user-data-dir={home}",
             "--remote-debugging-port=0", "about:blank",
             stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,

@@ -15,7 +15,7 @@ import skin_oracle
 from risorius.anyhead.conform import conform, conform_face, head, is_same_topology
 from risorius.anyhead.conform.parts import Ball
 from risorius.anyhead.errors import Stopped
-from risorius.anyhead.registration import Registered
+from risorius.anyhead.laying import Laid
 from risorius.author.geometry import skeleton as sk
 from risorius.author.heads.parts import HeadPart
 from risorius.author.input.obj import ObjMesh
@@ -205,6 +205,89 @@ def test_eyes_stay_spheres_about_their_joints_and_turn_in_place(face):
     assert np.linalg.norm(points - balls[0].middle, axis=1) == pytest.approx(1.1, abs=1e-4)
 
 
+COLUMNS = np.radians(np.linspace(-60, 60, 13))
+ROWS = [(60, 1.1), (45, 1.1), (30, 1.1), (20, 1.1), (10, 1.1), (10, 1.0)]  # degrees, radius
+
+
+def face_with_lids(shape):
+    """Two lids before an eye of 1 cm at the origin; a control turns the upper one by 20 degrees
+    until its rim lies on the other. shape: whether it has a blend shape too, which does nothing."""
+    upper = np.array([
+        [r * np.sin(a), r * np.cos(a) * np.sin(e), r * np.cos(a) * np.cos(e)]
+        for e, r in ((np.radians(e), r) for e, r in ROWS) for a in COLUMNS
+    ])  # fmt: skip
+    at = np.arange(len(upper)).reshape(len(ROWS), -1)
+    quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
+    points = np.concatenate([upper, upper * [1, -1, 1]])
+    quads = np.concatenate([quads, quads[:, ::-1] + len(upper)])
+    flat = np.arange(len(points))
+    held = np.repeat(np.array([0, 0.3, 0.6, 0.9, 1, 1]), len(COLUMNS))
+    weights = np.stack([1 - held, held], axis=1)
+    weights = np.concatenate([weights, np.tile([1.0, 0.0], (len(upper), 1))])
+    mesh = risorius.Mesh(
+        positions=points, normals=points, texture_coordinates=points[:, :2],
+        layout_positions=flat, layout_texture_coordinates=flat, layout_normals=flat,
+        face_offsets=4 * np.arange(len(quads) + 1), face_layouts=quads.ravel(),
+        maximum_influence_per_vertex=2, skin_offsets=2 * np.arange(len(points) + 1),
+        skin_weights=weights.ravel(), skin_joint_indices=np.tile([0, 2], len(points)),
+        blend_shape_targets=[
+            risorius.BlendShapeTarget(
+                deltas=np.zeros((1, 3)), vertex_indices=[0], blend_shape_channel_index=0
+            )
+        ] if shape else [],
+    )  # fmt: skip
+    dna = risorius.Dna(
+        name="lids", lod_count=1, raw_control_names=["CTRL_expressions.eyeBlinkL"],
+        joint_names=["head", "FACIAL_L_Eye", "FACIAL_L_Lid"], joint_parents=[0, 0, 0],
+        mesh_names=["head_lod0_mesh", "eyeLeft_lod0_mesh"],
+        coordinate_system=("right", "up", "front"),
+        joint_row_count=27, joint_column_count=1,
+    )  # fmt: skip
+    dna.neutral_joint_translations = np.zeros((3, 3))
+    dna.neutral_joint_rotations = np.zeros((3, 3))
+    dna.meshes = [mesh, ball((0, 0, 0), 1, 1.0)]
+    dna.lod_mesh_mapping, dna.lod_joint_mapping = [[0, 1]], [[0, 1, 2]]
+    if shape:
+        dna.blend_shape_channel_names = ["eyeBlinkL"]
+        dna.lod_blend_shape_mapping = [[0]]
+        dna.mesh_blend_shape_channel_mapping = [(0, 0)]
+        dna.blend_shape_channels = risorius.BlendShapeChannels(
+            lods=[1], input_indices=[0], output_indices=[0]
+        )
+    dna.joint_groups = [
+        risorius.JointGroup(
+            lods=[3], input_indices=[0], output_indices=[21, 22, 23], joint_indices=[2],
+            values=[[20.0], [0.0], [0.0]],
+        )
+    ]  # fmt: skip
+    return dna
+
+
+@pytest.mark.parametrize(("shape", "left"), [(False, 0.45), (True, 0.01)])
+def test_lids_close_on_an_eye_that_is_wider_open(shape, left):
+    face = face_with_lids(shape)
+    rim = np.arange(4, 6)[:, None] * len(COLUMNS) + np.arange(2, len(COLUMNS) - 2)
+
+    def gap(dna, **raw):
+        points = posed(dna, 0, **raw)
+        return np.linalg.norm(points[rim] - points[rim + len(ROWS) * len(COLUMNS)], axis=-1)
+
+    assert gap(face, eyeBlinkL=1).max() < 0.06
+    points = skin_points(face)
+    wide = points * [1.0, 1.5, 1.0]
+    wide[:, 1] += 0.05 * (points[:, 1] > 0) * np.cos(points[:, 0])
+    other = conform(face, {SKIN: wide})
+    assert np.abs(skin_points(other) - wide).max() < 1e-5
+    # With the angle that it turned by before, the lid stops halfway.
+    was = copy.copy(other)
+    was.joint_groups = face.joint_groups
+    if shape:
+        was.meshes = [copy.copy(m) for m in other.meshes]
+        was.meshes[0].blend_shape_targets = face.meshes[0].blend_shape_targets
+    assert gap(was, eyeBlinkL=1).mean() > 0.08
+    assert gap(other, eyeBlinkL=1).mean() < left * gap(was, eyeBlinkL=1).mean()
+
+
 def test_axes_and_units_of_the_file_do_not_matter(face):
     moved = {SKIN: stretched(skin_points(face))}
     system = dict(
@@ -232,7 +315,8 @@ def as_part(dna, points, cut=False, name="sculpt"):
     faces = np.asarray(mesh.layout_positions)[np.asarray(mesh.face_layouts)].reshape(-1, 4).tolist()
     if cut:
         faces = [t for a, b, c, d in faces for t in ([b, c, d], [b, d, a])]
-    return HeadPart(name, ObjMesh(points, np.zeros((0, 2)), faces), source=name)
+    mesh = ObjMesh(points, np.zeros((0, 2)), faces, [[] for _ in faces])
+    return HeadPart(name, mesh, source=name)
 
 
 @pytest.mark.parametrize("cut", [False, True])
@@ -259,24 +343,19 @@ def test_a_head_of_another_topology_comes_to_the_place_of_the_face(face, monkeyp
     points = stretched(skin_points(face))  # cm, standing
     lean = sk.matrices_of_vectors(np.array([0, np.pi / 2, 0]))
     given = 1.0 * points @ lean.T + [40, -3, 7]
-    marks = {f"eye_{place}_{s}": np.zeros(3) for place in ("inner", "outer") for s in "LR"}
-    found = SimpleNamespace(landmarks=SimpleNamespace(points=marks), pose=SimpleNamespace(scale=1))
     part = as_part(face, given)
     part.mesh.faces.reverse()
     part.mesh.faces[0] = [0, 30, 77]  # no polygon of the face
-    standing = SimpleNamespace(parts=[part], found=found, notes=["as it is"])
+    standing = SimpleNamespace(parts=[part], found=None, notes=["as it is"])
     monkeypatch.setattr(head, "stand", lambda *_: standing)
-    monkeypatch.setattr(head, "find_form", lambda *_: found)
-    monkeypatch.setattr(head, "start_of", lambda *_: None)
     seen = []
 
-    def register(template, target, pairs, options, start, progress):
+    def lay(template, name, target, found, threads, progress):
         seen.append((template, target))
         progress(1.0)
-        sure = np.ones(len(given), bool)
-        return Registered(given, np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros(0), sure)
+        return Laid(given, np.ones(len(given)))
 
-    monkeypatch.setattr(head, "register", register)
+    monkeypatch.setattr(head, "lay_surface", lay)
     heard = []
     made = conform_face(mirrored, [part], None, heard.append)
     template, target = seen[0]
@@ -337,7 +416,7 @@ def test_the_command_writes_the_face_of_a_sculpt(face, tmp_path, capsys):
     command = ["author", "--conform", head, source, "-o", out]
     assert main([str(word) for word in command]) == 0
     said = capsys.readouterr().out
-    assert "head_lod0_mesh: the head has the face's own polygons" in said
+    assert "head_lod0_mesh: the head has the topology of the face" in said
     made = risorius.load(out)
     assert made.version == 5
     assert np.abs(posed(made, 0) - points).max() < 1e-3
@@ -347,7 +426,7 @@ def test_the_command_writes_the_face_of_a_sculpt(face, tmp_path, capsys):
     for more, code, sentence in (
         (["--bound"], 2, "--conform takes no --bound"),
         (["--scale", "nan"], 2, "--scale"),
-        (["--height-mm", "240"], 1, "the head has the face's own polygons"),
+        (["--height-mm", "240"], 1, "use scale instead"),
     ):
         assert main([str(word) for word in [*command, *more]]) == code
         assert sentence in capsys.readouterr().err

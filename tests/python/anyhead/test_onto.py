@@ -54,6 +54,7 @@ def test_a_head_without_expressions_becomes_a_rig(template, head, tmp_path) -> N
                "--write-landmarks", marks, "--exact", text=True)  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "its top is +z" in done.stdout
+    assert "backs" not in done.stdout
     assert '"mouth_corner_L"' in marks.read_text()
     dna = load(out)
     names = [name.rpartition(".")[2] for name in dna.raw_control_names]
@@ -63,6 +64,9 @@ def test_a_head_without_expressions_becomes_a_rig(template, head, tmp_path) -> N
     rest, open_ = (posed.positions(raw, mesh) for raw in
                    (np.zeros(len(names)), np.eye(len(names))[names.index("jawOpen")]))  # fmt: skip
     assert np.abs(rest - points).max() < 0.01  # it stands, in cm
+    place = dna.neutral_joint_translations[dna.joint_names.index("head")]
+    assert abs(place[0]) < 1  # between the ears
+    assert points[:, 1].min() < place[1] < points[:, 1].max()
     form = head_form()
     wanted = form.expressions[form.expression_names.index("jaw_open")][: form.skin]
     moves = np.linalg.norm(wanted, axis=1) > 0.1

@@ -142,3 +142,22 @@ def test_ends_with_one_sentence(take, tmp_path, capsys, monkeypatch, arguments, 
     assert error.count("\n") == 1
     assert sentence.split("|")[-1] in error
     assert not (tmp_path / "a.csv").exists()
+
+
+def test_a_curve_table_is_what_unreal_imports(take, tmp_path, capsys):
+    rows, table = tmp_path / "curves.csv", tmp_path / "curves.json"
+    for out in (rows, table):
+        assert run("convert", take, "-o", out, "--curve-table", "--rotations", "none") == 0
+    direct, _ = importing.import_file(take, rotations="none")
+    lines = [line.split(",") for line in rows.read_text().splitlines()]
+    names = [name.replace(".", "_") for name in direct.names]
+    assert lines[0][0] == "---"
+    assert [line[0] for line in lines[1:]] == names
+    assert "CTRL_expressions_jawOpen" in names
+    np.testing.assert_allclose(np.array(lines[0][1:], float), direct.frame_times(), atol=1e-6)
+    np.testing.assert_array_equal(np.array([x[1:] for x in lines[1:]], np.float32), direct.curves)
+    back = importing.read(table).clip
+    assert list(back.names) == names
+    np.testing.assert_allclose(back.curves, direct.curves, atol=1e-6)
+    assert run("convert", take, "-o", tmp_path / "c.rzc", "--curve-table") == 2
+    assert "a curve table, a name ending in .csv or .json" in capsys.readouterr().err

@@ -18,6 +18,7 @@ PARTS = {
     "authoring": ["author"],
     "ranges": ["clip"],
     "files": ["convert", "edit"],
+    "onto": ["author"],
 }
 
 

@@ -14,12 +14,17 @@ import pytest
 import risorius
 from conftest import GOLDEN, PROJECT, no_room
 from gltf_oracle import GlbFile
+from risorius import importing
 from risorius.cli import main
 from risorius.controls import arkit
 from risorius.files.jpeg import jpeg
 from risorius.files.png import png
-from risorius.gameface import Wishes, export
+from risorius.gameface import Wishes, export, faces
+from risorius.gameface.combining import weight_of
+from risorius.gameface.refining import pose_of
+from risorius.gameface.targets import find_targets
 
+UNITS = list(arkit.mapping())
 HEAD, TEETH = "head_lod0_mesh", "teeth_lod0_mesh"
 LISTS = {
     "plain": [],
@@ -153,6 +158,60 @@ def test_the_driver_brings_sums_of_two_to_the_rig(face, tmp_path):
         assert np.abs(found.positions(HEAD, weights) - wanted).max() > 2e-5
         weights[row["target"]] = 1.0  # the product of ones, and 4 w (1 - w) of a half
         assert np.abs(found.positions(HEAD, weights) - wanted).max() < 5e-5
+
+
+@pytest.mark.parametrize("kind", ["cubic", "early", "late", "middle", "triple"])
+def test_refinements_leave_exact_poses_alone(kind):
+    # where one target is on, or two are fully on, the other targets are exact
+    many = {"cubic": 1, "triple": 3}.get(kind, 2)
+    for on in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.0, 0.5)):
+        weights = np.array([*on, 0.0])[:many]
+        if many > 1 or weights[0] in (0, 0.5, 1):
+            assert abs(float(weight_of(kind, *weights))) < 1e-12
+    assert weight_of("shut", np.array(0.1), np.array(0.1), np.array(1.0)) == 0.9
+
+
+def test_refinements_bring_poses_that_are_partly_on_nearer(face, tmp_path, capsys):
+    arguments = ["export", str(face), "-o", str(tmp_path / "f.glb"), "--shapes", "arkit"]
+    arguments += ["--lod", "3"]
+    take = tmp_path / "take.csv"
+    rows = [",".join(["Timecode,BlendShapeCount", *(u[0].upper() + u[1:] for u in UNITS)])]
+    rows += [f"00:00:{i:02}:00.0,52,{','.join(['0.4'] * 52)}" for i in range(20)]
+    take.write_text("\n".join(rows))
+    assert main([*arguments, "--within", "250", "--takes", str(take)]) == 0
+    said = capsys.readouterr().out
+    after, before = re.search(r"poses within ([\d.]+) mm, without them ([\d.]+)", said).groups()
+    assert float(after) < 0.95 * float(before)
+    table = json.loads((tmp_path / "f.combinations.json").read_text())["combinations"]
+    found, names = GlbFile((tmp_path / "f.glb").read_bytes()), arkit.mapping().keys()
+    for row in table:
+        assert row["target"] in found.names("head_lod3_mesh")
+        assert names >= set(row["of"])
+    assert {"product", "triple"} & {row["weight"] for row in table}
+    code, line = sentence(capsys, *arguments[1:], "--within", "1", "--takes", str(face))
+    assert code == 1
+    assert str(face) in line
+    take.write_text("time,a,b\n0,1,2\n1,2,3\n")
+    code, line = sentence(capsys, *arguments[1:], "--within", "1", "--takes", str(take))
+    assert (code, "curves of ARKit's units were expected" in line) == (1, True), line
+    code, line = sentence(capsys, *arguments[1:], "--takes", str(take))
+    assert (code, "add --within" in line) == (2, True)
+
+
+def test_poses_of_weights_are_those_of_imported_captures(face, tmp_path):
+    rig, take = risorius.compile_cached(face), tmp_path / "take.csv"
+    targets, _ = find_targets(rig, ["arkit"], "the face")
+    weights = faces.typical([target.name for target in targets], 12)
+    table = [",".join(["time", *(target.name for target in targets)])]
+    table += [",".join(map(str, (i / 30, *row))) for i, row in enumerate(weights)]
+    take.write_text("\n".join(table))
+    clip, _ = importing.import_file(take, rig.raw_control_names, mapping="arkit")
+    rest = np.asarray(rig.initial_raw_controls, np.float32)
+    assert (weights[:, [t.name for t in targets].index("mouthClose")] > 0).any()
+    for row, wanted in zip(weights, clip.curves.T, strict=True):
+        raw = dict(zip(rig.raw_control_names, pose_of(targets, rest, row), strict=True))
+        for name, value in zip(clip.names, wanted, strict=True):
+            assert abs(raw.get(name, value) - value) < 1e-5, name
 
 
 def test_a_size_lowers_textures_then_vertices_then_the_level(face, tmp_path, capsys):

@@ -24,10 +24,13 @@ def driven(weights, table):
     """Weights with those of the combinations, as combinations.js sets them."""
     out = dict(weights)
     for row in table["combinations"]:
-        a, b = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0)[:2]
+        a, b, c = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0, 0.0)[:3]
         kinds = {
             "product": a * b, "half": 4 * a * (1 - a), "below": 4 * a * (1 - b),
-            "share": 4 * a * max(0, b - a),
+            "share": 4 * a * max(0, b - a), "cubic": 32 / 3 * a * (1 - a) * (1 - 2 * a),
+            "early": 4 * a * (1 - a) * b, "late": 4 * a * b * (1 - b),
+            "middle": 16 * a * b * (1 - a) * (1 - b), "triple": a * b * c,
+            "shut": min(1.0, a / max(b, 0.02)) * (1 - b) * c,
         }  # fmt: skip
         out[row["target"]] = float(kinds[row["weight"]])
     return out
@@ -36,8 +39,9 @@ def driven(weights, table):
 class Posed:
     """The meshes of a .glb at weights, and the rig's meshes in the same order at raw controls."""
 
-    def __init__(self, dna, rig, found, lod):
+    def __init__(self, dna, rig, found, lod, *, facing_back=False):
         self.rig, self.found = rig, found
+        self._sides = np.array([-1.0, 1.0, -1.0]) if facing_back else np.ones(3)
         self._surface = risorius.Surface(dna, rig, lod)
         self._number = {name: i for i, name in enumerate(dna.mesh_names)}
         self._rest, self._deltas, self._where = {}, {}, {}
@@ -75,7 +79,8 @@ class Posed:
 
     def _own(self, mesh, raw):
         # The sample's axes are those of glTF; its unit is the centimetre.
-        return self._surface.positions(raw, self._number[mesh]).astype(np.float64) / 100
+        found = self._surface.positions(raw, self._number[mesh]).astype(np.float64)
+        return found * self._sides / 100
 
 
 def frames(path, take, *, lod, every):

@@ -73,8 +73,11 @@ class GlbFile:
     def names(self, name):
         return self.meshes()[name][1].get("extras", {}).get("targetNames", [])
 
-    def positions(self, name, weights=None, kind="POSITION"):
-        """float64[V, 3] of a mesh in the scene, its targets on by weights, its joints at rest."""
+    def positions(self, name, weights=None, kind="POSITION", world=None):
+        """float64[V, 3] of a mesh in the scene, its targets on by weights.
+
+        Args:
+            world: node -> float64[4, 4], where its joints are; None: at rest."""
         node, mesh = self.meshes()[name]
         [primitive] = mesh["primitives"]
         out = self.numbers(primitive["attributes"][kind])
@@ -83,14 +86,14 @@ class GlbFile:
         for target, called in zip(primitive.get("targets", []), names, strict=True):
             if weights and weights.get(called) and kind in target:
                 out = out + weights[called] * self.numbers(target[kind])
-        return self._placed(node, primitive, out) if kind == "POSITION" else out
+        return self._placed(node, primitive, out, world) if kind == "POSITION" else out
 
-    def _placed(self, node, primitive, points):
+    def _placed(self, node, primitive, points, world):
         if "skin" not in node:
             return points * node.get("scale", 1.0) + node.get("translation", [0, 0, 0])
         skin = self.json["skins"][node["skin"]]
         inverse = self.numbers(skin["inverseBindMatrices"]).reshape(-1, 4, 4).swapaxes(1, 2)
-        world = self._world()
+        world = self._world() if world is None else world
         moves = np.stack([world[j] @ inverse[i] for i, j in enumerate(skin["joints"])])
         joints = self.numbers(primitive["attributes"]["JOINTS_0"]).astype(int)
         weights = self.numbers(primitive["attributes"]["WEIGHTS_0"])
@@ -104,6 +107,7 @@ class GlbFile:
         def walk(number, above):
             node = self.json["nodes"][number]
             own = np.eye(4)
+            own[:3, :3] = _turn(*node.get("rotation", [0, 0, 0, 1]))
             own[:3, 3] = node.get("translation", [0, 0, 0])
             out[number] = above @ own
             for child in node.get("children", []):
@@ -112,3 +116,10 @@ class GlbFile:
         for number in self.json["scenes"][0]["nodes"]:
             walk(number, np.eye(4))
         return out
+
+
+def _turn(x, y, z, w):
+    """float64[3, 3] of a unit quaternion."""
+    assert abs(x * x + y * y + z * z + w * w - 1) < 1e-6
+    a, b = np.array([x, y, z]), np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) * (w * w - a @ a) + 2 * np.outer(a, a) + 2 * w * b

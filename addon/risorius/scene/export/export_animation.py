@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ... import native
 from ...logic.animation import clip_units, key_reduction
-from ...logic.base.names import unique_labels
+from ...logic.base.names import unique_labels, without_lod
 from ...logic.base.sentences import told
 from ..animation import actions
 from ..bake import bake_face, baked_shape_keys, baked_tracks, sampling
@@ -27,6 +27,7 @@ from ..base import compat, last_written, parts
 from ..base.blender_types import ArmatureObject, Context, MeshObject, Override
 from ..character import meshes, runtime
 from ..frame import evaluate
+from ..lod import lods
 from .lent_names import Loans
 
 
@@ -39,6 +40,7 @@ class ShipOptions:
         lod: level of detail; -1: the level in the viewport.
         wanted: some of "BONES", "SHAPES".
         all_shapes: keep shape keys that the range does not use.
+        lod_groups: meshes of all levels that are built, from lod on, in groups that FBX knows.
     """
 
     start: float = 1
@@ -47,6 +49,7 @@ class ShipOptions:
     lod: int = -1
     wanted: frozenset[str] = frozenset(("BONES", "SHAPES"))
     all_shapes: bool = False
+    lod_groups: bool = False
 
 
 def sampled(
@@ -156,12 +159,42 @@ def _copy(
     if "BONES" in options.wanted:
         tracks = baked_tracks.rig_tracks(rig, live, samples, pose, {"BONES"}, copy)
         _play(copy, samples.frames, tracks)
-    for item in bake_face.shown(rig, level):
-        made = _copy_mesh(stage, item, copy, live, loans)
-        weights = pose.blend_shapes if "SHAPES" in options.wanted else pose.blend_shapes * 0.0
-        _shapes(made, item, live, samples, weights, options)
-        _forget(made)
+    groups: dict[str, bpy.types.Object] = {}
+    copied: set[MeshObject] = set()
+    for own in _levels(rig, level, options):
+        shapes = (pose if own == level else baked_tracks.evaluate(live, samples, own)).blend_shapes
+        weights = shapes if "SHAPES" in options.wanted else shapes * 0.0
+        for item in bake_face.shown(rig, own):
+            if item in copied:
+                continue
+            copied.add(item)
+            made = _copy_mesh(stage, item, copy, live, loans)
+            _shapes(made, item, live, samples, weights, options)
+            _forget(made)
+            if options.lod_groups:
+                base = without_lod(made.name)
+                if base not in groups:
+                    groups[base] = _lod_group(stage, copy, base, loans)
+                made.parent = groups[base]
     _forget(copy)
+
+
+def _levels(rig: ArmatureObject, level: int, options: ShipOptions) -> list[int]:
+    """The level, and with groups the coarser ones that were built."""
+    coarser = [other for other in lods.built(rig) if other > level] if options.lod_groups else []
+    return [level, *sorted(coarser)]
+
+
+def _lod_group(
+    stage: bpy.types.Scene, rig_copy: ArmatureObject, base: str, loans: Loans
+) -> bpy.types.Object:
+    """An empty that Blender writes as a LOD group of FBX; its meshes follow from fine to coarse."""
+    group = bpy.data.objects.new(base, None)
+    loans.take("objects", group, f"{base}_LODGroup")
+    group["fbx_type"] = "LodGroup"  # as Blender's FBX exporter asks for it
+    group.parent = rig_copy
+    stage.collection.objects.link(group)
+    return group
 
 
 def _copy_mesh(

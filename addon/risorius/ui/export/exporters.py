@@ -41,6 +41,7 @@ class ExportOperator(Protocol):
     step: float
     influences: int
     fbx_units: str
+    lod_groups: bool
 
 
 def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
@@ -70,7 +71,8 @@ def _gltf(operator: ExportOperator, stage: bpy.types.Scene) -> Settings:
 
 def _fbx(operator: ExportOperator, _stage: bpy.types.Scene) -> Settings:
     return {
-        "object_types": {"ARMATURE", "MESH"},
+        "object_types": {"ARMATURE", "MESH", "EMPTY"},  # an empty is a LOD group
+        "use_custom_props": operator.lod_groups,  # which say that it is one
         "add_leaf_bones": False,
         "use_armature_deform_only": False,
         "bake_anim": True,

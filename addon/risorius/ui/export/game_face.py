@@ -13,10 +13,11 @@ from ...scene.file import export_dna
 from .. import words
 from ..blender_types import Context, ExportHelper, Operator, Result
 from ..common import FaceOperator, explain, face_rig, proposed_file, system_path
+from .licence import LicenceForm
 
 
-class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
-    """Write the active face as glTF with morph targets."""
+class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Operator):
+    """Write the active face as glTF or VRM with morph targets."""
 
     bl_idname = "risorius.export_game_face"
     bl_label = "Export Game Face"
@@ -26,8 +27,7 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
     )
     bl_options = {"PRESET"}
 
-    filename_ext = ".glb"
-    filter_glob: bpy.props.StringProperty(default="*.glb", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default="*.glb;*.vrm", options={"HIDDEN"})
     shapes: bpy.props.EnumProperty(
         name="Shapes",
         items=(
@@ -53,6 +53,15 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
     use_skeleton: bpy.props.BoolProperty(
         name="Skeleton", description="Joints of neck, head, jaw and eyes", default=True
     )
+    body: bpy.props.EnumProperty(
+        name="Body",
+        description="Bones of a body that the face lacks, without meshes",
+        items=(
+            ("NONE", "None", "The joints that the face has"),
+            ("minimal", "Minimal", "The bones that a VRM needs"),
+            ("mixamo", "Mixamo", "All bones by Mixamo's names, as TalkingHead wants them"),
+        ),
+    )
     use_quantize: bpy.props.BoolProperty(
         name="Quantize", description="Store vertices with 16 bits; most programs read this"
     )
@@ -67,9 +76,14 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
         ),
     )
 
+    @property
+    def filename_ext(self) -> str:
+        """Blender puts it behind the name of the file."""
+        return ".glb" if self.vrm == "NONE" else ".vrm"
+
     def invoke(self, context: Context, event: bpy.types.Event) -> Result:
         if not self.filepath:
-            self.filepath = proposed_file(face_rig(context).name, ".glb")
+            self.filepath = proposed_file(face_rig(context).name, self.filename_ext)
         return ExportHelper.invoke(self, context, event)
 
     def draw(self, context: Context) -> None:
@@ -79,14 +93,18 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
         column = layout.column(heading="Shapes")
         column.use_property_split = False
         column.prop(self, "shapes")
-        for name in ("lod", "megabytes"):
+        for name in ("lod", "megabytes", "body", "vrm"):
             layout.prop(self, name)
+        if self.vrm != "NONE":
+            self.draw_licence(layout)
         for name in ("use_skeleton", "use_quantize", "use_meshopt", "use_combinations"):
             layout.prop(self, name)
 
     def execute(self, context: Context) -> Result:
         fileio, gameface = native.part("files.fileio"), native.part("gameface")
         self.filepath = system_path(self.filepath)
+        if self.vrm != "NONE":
+            self.filepath = str(Path(self.filepath).with_suffix(".vrm"))
         out = Path(self.filepath)
         try:
             fileio.check_writable(self.filepath)
@@ -102,6 +120,9 @@ class RISORIUS_OT_export_game_face(FaceOperator, ExportHelper, Operator):
                 meshopt=self.use_meshopt,
                 mb=self.megabytes or None,
                 within=0.5 if self.use_combinations else None,
+                humanoid="" if self.body == "NONE" else self.body,
+                vrm="" if self.vrm == "NONE" else self.vrm,
+                licence={} if self.vrm == "NONE" else self.licence(),
             )
             made = gameface.export(dna, native.module().Rig(dna), source, out.name, wishes)
             fileio.write_all({out.with_name(name): data for name, data in made.files.items()})

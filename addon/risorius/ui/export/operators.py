@@ -82,6 +82,11 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             ("FBX_SCALE_ALL", "In the File", "Objects have scale 1: as Unity expects it"),
         ),
     )
+    lod_groups: bpy.props.BoolProperty(
+        name="LOD Groups",
+        description="Write also the coarser levels that were built, in groups between which an "
+        "engine changes by distance",
+    )
     bake_materials: bpy.props.BoolProperty(
         name="Bake Materials",
         description="Give the file plain materials with one image each for colour, roughness and "
@@ -138,6 +143,7 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             words.prop_or(layout, self, "influences", 0, "0: all joints")
         if self.format == "FBX":
             layout.prop(self, "fbx_units")
+            layout.prop(self, "lod_groups")
         if self.format in ("RZC", "CSV"):
             layout.prop(self, "maps")
         layout.prop(self, "every")
@@ -152,8 +158,9 @@ class RISORIUS_OT_export_animation(FrameRange, FacesOperator, ExportHelper, Oper
             return {"CANCELLED"}
         start, end = self.frames(context)
         options = export_animation.ShipOptions(
-            start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes
-        )
+            start, end, self.step, self.lod, frozenset(self.wanted), self.all_shapes,
+            self.lod_groups and self.format == "FBX",
+        )  # fmt: skip
         try:
             characters = run(
                 context, export_animation.sampled(context, self.faces(context), options)

@@ -175,7 +175,7 @@ def draw_export(self: Menu, _context: Context) -> None:
     self.layout.operator(
         "risorius.export_animation", text="Face Animation (.glb, .fbx, .usd, .abc)"
     )
-    self.layout.operator("risorius.export_game_face", text="Game Face (.glb)")
+    self.layout.operator("risorius.export_game_face", text="Game Face (.glb, .vrm)")
 
 
 CLASSES = (RISORIUS_OT_replace_dna, RISORIUS_OT_reload, RISORIUS_OT_export_dna)

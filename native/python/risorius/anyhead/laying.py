@@ -52,15 +52,40 @@ def lay(
         RegistrationError: nothing of the head near the template.
         Stopped: progress said False.
     """
-    if np.array_equal(face.surface.triangles, target.triangles):
+    return lay_surface(face.surface, face.name or "the template", target, found, threads, progress)
+
+
+def lay_surface(
+    template: Surface,
+    name: str,
+    target: Surface,
+    found: Found,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Laid:
+    """Lay the skin of a face onto a head.
+
+    Args:
+        template: the skin, standing, cm.
+        name: what errors call it.
+        target: the head, standing, cm.
+        found: its form and landmarks.
+        threads: 0: one for each core.
+        progress: told the share that is done, 0 to 1; False stops.
+
+    Raises:
+        LandmarkError: the template has no face.
+        RegistrationError: nothing of the head near the template.
+        Stopped: progress said False.
+    """
+    if np.array_equal(template.triangles, target.triangles):
         return Laid(target.points, np.ones(len(target.points)))
-    standing = Hints(face.name or "the template", {}, np.eye(3)[1], np.eye(3)[2])
-    own = find_form(face.surface, standing)
-    start = start_of(face.surface, target, own, found)
-    pairs = [(v, goal.tolist()) for v, goal in pairs_of(face.surface, own, found)]
+    own = find_form(template, Hints(name, up=np.eye(3)[1], front=np.eye(3)[2]))
+    start = start_of(template, target, own, found)
+    pairs = [(v, goal.tolist()) for v, goal in pairs_of(template, own, found)]
     options = RegisterOptions(threads=threads)
     try:
-        laid = register(face.surface, target, pairs, options, start, progress)
+        laid = register(template, target, pairs, options, start, progress)
     except StoppedError:
         raise Stopped from None
     return Laid(laid.points, laid.trusted.astype(np.float64), laid)

@@ -38,6 +38,7 @@ from .transfer.template import Floats, Pose, Progress, read_template
 from .transfer.transfer import TransferOptions, transfer
 
 Say = Callable[[str], None]
+_JOINT = np.array([[0.0, -4.0, -6.0]])  # of the form of heads, whose 0 lies between the eyes
 # Shares of the work at whose ends the steps are.
 _FACE, _TEMPLATE, _LAID, _CARRIED = 0.2, 0.25, 0.7, 0.85
 
@@ -69,11 +70,13 @@ class Onto:
         shapes: the head, standing; its expressions are called as the template's controls, and
             those of correctives by theirs with a + between.
         landmarks: in the space that the meshes had.
+        joint: float64[3], the middle of the head, about which it nods.
         notes: what was guessed and done, a sentence each; those of shape_face come beside.
     """
 
     shapes: ShapeSet
     landmarks: Landmarks
+    joint: Doubles
     notes: list[str] = field(default_factory=list)
 
 
@@ -129,7 +132,8 @@ def onto(
     joined = join(where, every, "cm", Wishes(mesh=every[0].source), names, stands=True)
     shapes = shape_set(template.name or "head", joined)
     _at(progress, 1.0)
-    return Onto(shapes, head.own, [*notes, *head.notes, *fitted.notes, *joined.notes])
+    joint = head.found.pose.place(_JOINT)[0]
+    return Onto(shapes, head.own, joint, [*notes, *head.notes, *fitted.notes, *joined.notes])
 
 
 def _mended(
@@ -182,6 +186,7 @@ def shape_face(made: Onto, template: Dna, where: str) -> Read:
         own = [(which, delta[face.start : face.stop]) for which, delta in rows]
         dna = add_correctives(dna, 0, own)
     _copy_board(template, dna)
+    _place_head(dna, made.joint)
     return Read(dna, Assignment({}, {}, {}, []), odd, materials, shapes.kept)
 
 
@@ -220,6 +225,17 @@ def _copy_board(template: Dna, dna: Dna) -> None:
         slope_values=np.asarray(table.slope_values)[kept],
         cut_values=np.asarray(table.cut_values)[kept],
     )
+
+
+def _place_head(dna: Dna, place: Doubles) -> None:
+    """The joint of the head where the head is, also in a mesh with a body below."""
+    joint = dna.joint_names.index("head")
+    local = np.array(dna.neutral_joint_translations, np.float64)
+    below = np.asarray(dna.joint_parents, np.int64) == joint
+    below[joint] = False
+    local[below] += local[joint] - place
+    local[joint] = place
+    dna.neutral_joint_translations = local
 
 
 def _silent(_line: str) -> None:

@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..author.geometry.skeleton import Doubles
+from ..author.geometry.skeleton import FARTHEST, Doubles
 from ..author.heads.directions import axis_of, check_axes, word_of
 from ..author.heads.parts import HeadPart, Wishes
 from ..author.heads.sizes import UNITS, check_unit, find_unit
@@ -18,9 +17,11 @@ from ..web.kinds import kind_of
 from .errors import AnyHeadError
 from .form.standing import CHIN, TOP
 from .landmarks.find import Found, Hints, find_form
-from .landmarks.marks import Landmarks
+from .landmarks.marks import LandmarkError, Landmarks
 from .surface import Surface
 
+_FLAT = 1e-3  # of the longest side
+_SNAP = 20.0  # degrees
 _ASIDE = ("hair", "cloth", "lashes", "teeth", "tongue", "gum", "eyes", "wet")
 
 
@@ -63,15 +64,21 @@ def stand(
     able = [part for part in parts if part.mesh.faces]
     if not able:
         raise AnyHeadError(f"{where}: a mesh with polygons was expected, found none")
+    _check_size(where, able)
     up, front = (axis_of(word) if word else None for word in (wishes.up, wishes.front))
     given = marks.points if marks is not None else {}
-    found = find_form(_skin_of(where, able, wishes.mesh), Hints(where, given, up, front))
+    skin, notes = _skin_of(where, able, wishes.mesh), []
+    found, backwards = _found(skin, Hints(where, given, up=up, front=front))
+    if backwards:
+        notes.append("the polygons show their backs: they are turned")
     found.landmarks.require(where)
-    turn = _turn(found.pose.rotation)
-    factor, notes = _factor((TOP - CHIN) * found.pose.scale, unit, wishes)
+    found.require_lips(where)
+    turn = _upright(found.pose.rotation)
+    factor, odd = _factor((TOP - CHIN) * found.pose.scale, unit, wishes)
     if not np.array_equal(turn, np.eye(3)):
         looks, top = word_of(turn[2]), word_of(turn[1])
-        notes.insert(0, f"the face looks along {looks}, its top is {top} (by its form)")
+        notes.append(f"the face looks about along {looks}, its top is {top} (by its form): it is "
+                     "turned until it stands")  # fmt: skip
     pose = replace(
         found.pose,
         rotation=turn @ found.pose.rotation,
@@ -81,11 +88,22 @@ def stand(
     points = {name: factor * turn @ p for name, p in found.landmarks.points.items()}
     landmarks = replace(found.landmarks, points=points)
     return Standing(
-        [_stood(part, factor * turn) for part in able],
+        [_stood(part, factor * turn, backwards=backwards) for part in able],
         replace(found, landmarks=landmarks, pose=pose),
         found.landmarks,
-        [*notes, *found.landmarks.notes],
+        [*notes, *odd, *found.landmarks.notes],
     )
+
+
+def _found(skin: Surface, hints: Hints) -> tuple[Found, bool]:
+    """The form of a head, and whether its polygons are to be turned. What hangs on it may be
+    turned where the head is not."""
+    if _inside_out(skin):
+        try:
+            return find_form(Surface(skin.points, skin.triangles[:, ::-1]), hints), True
+        except LandmarkError:
+            pass
+    return find_form(skin, hints), False
 
 
 def _skin_of(where: str, parts: Sequence[HeadPart], named: str) -> Surface:
@@ -103,20 +121,16 @@ def _skin_of(where: str, parts: Sequence[HeadPart], named: str) -> Surface:
     )
 
 
-def _turn(rotation: Doubles) -> Doubles:
-    """float64[3, 3], along the axes, from where a head is to standing: a head that leans a little
-    keeps its lean, as in authoring.
-
-    Args:
-        rotation: float64[3, 3], from the form to the head.
-    """
-    best = np.eye(3)
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            turn = np.array(signs)[:, None] * np.eye(3)[list(order)]
-            if np.linalg.det(turn) > 0 and np.trace(turn @ rotation) > np.trace(best @ rotation):
-                best = turn
-    return best
+def _check_size(where: str, parts: Sequence[HeadPart]) -> None:
+    points = np.concatenate([part.mesh.positions for part in parts])
+    largest = float(np.abs(points).max(initial=0.0))
+    if not largest <= FARTHEST:
+        raise AnyHeadError(
+            f"{where}: coordinates up to {FARTHEST:g} were expected, found {largest:g}"
+        )
+    extent = np.ptp(points, axis=0)
+    if not extent.min() > _FLAT * extent.max():
+        raise AnyHeadError(f"{where}: a head was expected, found vertices in one plane")
 
 
 def _factor(height: float, unit: str, wishes: Wishes) -> tuple[float, list[str]]:
@@ -135,7 +149,43 @@ def _factor(height: float, unit: str, wishes: Wishes) -> tuple[float, list[str]]
     return scale * UNITS[found] / UNITS["cm"], [odd] if odd else []
 
 
-def _stood(part: HeadPart, turn: Doubles) -> HeadPart:
-    mesh = part.mesh
-    placed = ObjMesh(mesh.positions @ turn.T, mesh.uvs, mesh.faces, mesh.uv_faces)
+def _stood(part: HeadPart, turn: Doubles, *, backwards: bool) -> HeadPart:
+    mesh, order = part.mesh, -1 if backwards else 1
+    placed = ObjMesh(
+        mesh.positions @ turn.T,
+        mesh.uvs,
+        [face[::order] for face in mesh.faces],
+        [face[::order] for face in mesh.uv_faces],
+    )
     return HeadPart(part.name, placed, {}, part.material, part.source, part.polygons)
+
+
+def _inside_out(surface: Surface) -> bool:
+    """Whether most triangles show their backs, as in a mirrored file.
+
+    Args:
+        surface: closed, or with openings that are small against the whole.
+    """
+    middle = surface.points[np.unique(surface.triangles)].mean(axis=0)
+    a, b, c = (surface.points[surface.triangles[:, k]] - middle for k in range(3))
+    return float(np.einsum("ti,ti->t", a, np.cross(b, c)).sum()) < 0
+
+
+def _upright(rotation: Doubles) -> Doubles:
+    """The rotation that makes a head stand, float64[3, 3].
+
+    A head within 20 degrees of the axes of its file keeps to these axes.
+
+    Args:
+        rotation: float64[3, 3], from the standing form to the head.
+    """
+    axes = np.zeros((3, 3))
+    for row, column in ((1, 1), (2, 2)):  # up, then front
+        way = rotation[:, column] * (1 - np.abs(axes).sum(axis=0))
+        at = int(np.abs(way).argmax())
+        axes[row, at] = np.sign(way[at])
+    axes[0] = np.cross(axes[1], axes[2])
+    cosine = (np.trace(axes @ rotation) - 1) / 2
+    if np.degrees(np.arccos(np.clip(cosine, -1, 1))) < _SNAP:
+        return axes
+    return np.asarray(rotation.T.copy())

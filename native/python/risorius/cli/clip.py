@@ -19,6 +19,7 @@ from .files import CommandLineError, number, refuse_same_file, require_writable
 from .ranges import add_learn, with_ranges
 
 OUTPUTS = (".rzc", ".csv", ".json")
+TABLES = (".csv", ".json")
 _MAPPING = (
     "name of a mapping (see risorius clip mappings) or a TOML file; default: the mapping that fits"
 )
@@ -48,6 +49,11 @@ def _add_convert(commands: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     _add_input(parser)
     parser.add_argument("-o", "--output", required=True, type=Path, metavar="OUT")
+    parser.add_argument(
+        "--curve-table",
+        action="store_true",
+        help="OUT, .csv or .json, as Unreal Engine imports curve tables: CTRL_expressions_jawOpen",
+    )
     _add_meaning(parser)
     _add_steps(parser)
     parser.set_defaults(func=run_convert)
@@ -210,6 +216,10 @@ def complain(args: argparse.Namespace) -> None:
         raise CommandLineError(f"--full-value: above 0 was expected, found {args.full_value:g}")
     if args.output.suffix.lower() not in OUTPUTS:
         raise CommandLineError(f"{args.output}: a name ending in {', '.join(OUTPUTS)} was expected")
+    if getattr(args, "curve_table", False) and args.output.suffix.lower() not in TABLES:
+        raise CommandLineError(
+            f"{args.output}: a curve table, a name ending in .csv or .json, was expected"
+        )
     refuse_same_file(str(args.input), str(args.output))
     require_writable(args.output)
 
@@ -229,7 +239,7 @@ def run_convert(args: argparse.Namespace) -> int:
     clip = with_ranges(clip, args.range, report)
     for step in steps:
         clip = step(clip)
-    _save(clip, args.output)
+    _save(clip, args.output, as_table=args.curve_table)
     if args.report:
         print(report.text())
     else:
@@ -301,10 +311,13 @@ def _pair(text: str, option: str, number: Callable[[str, int], float]) -> tuple[
     return start, end
 
 
-def _save(clip: Clip, path: Path) -> None:
-    """Save in the format of the suffix."""
+def _save(clip: Clip, path: Path, *, as_table: bool = False) -> None:
+    """Save in the format of the suffix; as_table: as a curve table of Unreal."""
     suffix = path.suffix.lower()
-    if suffix == ".rzc":
+    if as_table:
+        text = importing.curve_table_text(clip, is_json=suffix == ".json")
+        importing.write_text(text, path)
+    elif suffix == ".rzc":
         clip.save(path)
     elif suffix == ".csv":
         importing.write_text(importing.csv_text(clip), path)

@@ -10,14 +10,21 @@
 
 const FORMAT = 'risorius.combinations';
 const VERSION = 1;
+const LEAST = 0.02; // what is on top of less than this is a share of this
 const KINDS = {
   product: { drivers: 2, weight: (a, b) => a * b },
   half: { drivers: 1, weight: (a) => 4 * a * (1 - a) },
   below: { drivers: 2, weight: (a, b) => 4 * a * (1 - b) },
   share: { drivers: 2, weight: (a, b) => 4 * a * Math.max(0, b - a) },
+  cubic: { drivers: 1, weight: (a) => 32 / 3 * a * (1 - a) * (1 - 2 * a) },
+  early: { drivers: 2, weight: (a, b) => 4 * a * (1 - a) * b },
+  late: { drivers: 2, weight: (a, b) => 4 * a * b * (1 - b) },
+  middle: { drivers: 2, weight: (a, b) => 16 * a * b * (1 - a) * (1 - b) },
+  triple: { drivers: 3, weight: (a, b, c) => a * b * c },
+  shut: { drivers: 3, weight: (a, b, c) => Math.min(1, a / Math.max(b, LEAST)) * (1 - b) * c },
 };
 
-/** The weight of a combination's target, 0 to 1, from the weights of those that drive it. */
+/** The weight of a combination's target from the weights of those that drive it. */
 export function weightOf(kind, weights) {
   const inside = weights.map((w) => Math.min(1, Math.max(0, w)));
   return KINDS[kind].weight(...inside);

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from .._native import Rig
 from ..anim.reactions import load_exclusives
+from ..controls.shares import share_of
 from .parts import Points
 from .targets import Target
 
@@ -22,6 +23,23 @@ PRODUCT, HALF, BELOW, SHARE = "product", "half", "below", "share"
 """How a combination's weight comes of a and b that drive it: a b; 4 a (1 - a); and where a acts on
 top of b, as mouthClose does on jawOpen: 4 a (1 - b), which counts where both are half on, and
 4 a (b - a), which counts where a is half of what b is."""
+CUBIC, EARLY, LATE, MIDDLE = "cubic", "early", "late", "middle"
+TRIPLE, SHUT = "triple", "shut"
+"""Weights that are 0 where the others count: 32/3 a (1 - a) (1 - 2 a); 4 a (1 - a) b;
+4 a b (1 - b); 16 a b (1 - a) (1 - b); a b c; and where a
+acts on top of b, (1 - b) c for the share of b that a is."""
+_WEIGHTS: dict[str, Callable[..., Doubles]] = {
+    PRODUCT: lambda a, b: a * b,
+    HALF: lambda a: 4 * a * (1 - a),
+    BELOW: lambda a, b: 4 * a * (1 - b),
+    SHARE: lambda a, b: 4 * a * np.maximum(0.0, b - a),
+    CUBIC: lambda a: 32 / 3 * a * (1 - a) * (1 - 2 * a),
+    EARLY: lambda a, b: 4 * a * (1 - a) * b,
+    LATE: lambda a, b: 4 * a * b * (1 - b),
+    MIDDLE: lambda a, b: 16 * a * b * (1 - a) * (1 - b),
+    TRIPLE: lambda a, b, c: a * b * c,
+    SHUT: lambda a, b, c: share_of(a, b) * (1 - b) * c,
+}
 _LEAST = 2e-6  # metres: what a target moves less, it does not move
 _TRIED = 2000  # pairs of a group: of more, as many that are spread evenly
 
@@ -33,7 +51,7 @@ class Combination:
     Attributes:
         name: of its morph target.
         of: the targets that drive it.
-        weight: PRODUCT, HALF, BELOW or SHARE.
+        weight: PRODUCT, HALF, BELOW or SHARE, or of refining CUBIC to SHUT.
         error_mm: the largest deviation of the linear sum without it.
     """
 
@@ -94,9 +112,13 @@ class Sums:
         out = list[Combination]()
         for kind, of in wanted:
             name = "_x_".join(of) if kind == PRODUCT else f"{of[0]}_{kind}"
-            away = np.sqrt(np.square(self._missing(kind, of)).sum(axis=1).max(initial=0.0))
-            out.append(Combination(name, of, kind, 1000.0 * float(away)))
+            out.append(Combination(name, of, kind, self.apart(of, kind)))
         return sorted(out, key=lambda one: -one.error_mm)
+
+    def apart(self, of: tuple[str, ...], kind: str = PRODUCT) -> float:
+        """Millimetres of a sum from the rig at most. Args: of: its targets; kind: of weight."""
+        missing = self._missing(kind, of)
+        return 1000.0 * float(np.sqrt(np.square(missing).sum(axis=1).max(initial=0.0)))
 
     def _missing(self, kind: str, of: tuple[str, ...]) -> Doubles:
         """What the linear sum lacks where targets are on as their weight counts most."""
@@ -136,6 +158,11 @@ class Sums:
             return False
         on = [[self._names[i] for i in np.flatnonzero(t.raw != self._rest)] for t in (a, b)]
         return not any(frozenset((x, y)) in self._against for x in on[0] for y in on[1])
+
+
+def weight_of(kind: str, *drivers: Doubles) -> Doubles:
+    """The weight of a combination. Args: kind: of weight; drivers: weights from 0 to 1."""
+    return _WEIGHTS[kind](*drivers)
 
 
 def chosen(found: Sequence[Combination], within_mm: float, most: int) -> list[Combination]:

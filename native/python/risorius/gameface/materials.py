@@ -15,6 +15,7 @@ from ..files.png import pixels_of, pixels_to_png, read_pixels
 from ..web.kinds import kind_of
 from ..web.textures import Textures, base_name, halved, media_type
 from .glb import Glb
+from .naming import safe
 
 Pixels = npt.NDArray[np.uint8]
 
@@ -54,7 +55,7 @@ class Materials:
             longest: pixels of the longer side of a picture.
         """
         base, kind = base_name(mesh), kind_of(mesh)
-        name = base.replace("/", "_")
+        name = safe(base)
         if name in known:
             return known[name]
         colour, rough = _PLAIN[kind]

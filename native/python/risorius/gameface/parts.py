@@ -14,6 +14,7 @@ from ..author.geometry.skeleton import skin_entries
 from ..solving.surface import Surface
 from ..web.kinds import kind_of
 from .errors import GameFaceError
+from .naming import safe
 from .skeleton import Skeleton
 
 Doubles = npt.NDArray[np.float64]
@@ -60,11 +61,19 @@ class Points:
     Attributes:
         parts: the meshes.
         rest: float64[P, 3], metres, y up, the face looks along z.
-        axes: float64[3, 3] from the file's axes to those of glTF, metres.
+        axes: float64[3, 3] from the file's axes to those of the glTF, metres.
     """
 
-    def __init__(self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton) -> None:
-        """Args: dna: with geometry; rig: of it; lod: of the file; skeleton: of its joints."""
+    def __init__(self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles) -> None:
+        """Of a level.
+
+        Args:
+            dna: with geometry.
+            rig: of it.
+            lod: of the file.
+            skeleton: of its joints.
+            axes: as axes_of gives them.
+        """
         surface = Surface(dna, rig, lod)
         meshes = [m for m in surface.mesh_indices if len(dna.meshes[m].positions)]
         counts = [len(dna.meshes[m].positions) for m in meshes]
@@ -73,7 +82,7 @@ class Points:
         points = np.stack([mesh, vertex], axis=1)
         self._probe = surface.probe(points)
         self._face = dna.name or "the face"
-        self.axes = axes_of(dna)
+        self.axes = axes
         self.rest = self.at(np.asarray(rig.initial_raw_controls, np.float32))
         starts = np.concatenate([[0], np.cumsum(counts)])
         made = [
@@ -125,18 +134,24 @@ class Points:
         if not len(mesh.normals):
             normals = normals_of(self.rest[rows], triangles, rows)
         return Part(
-            name.replace("/", "_"), name, kind_of(name), rows,
+            safe(name), name, kind_of(name), rows,
             np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1), normals,
             triangles, joints[row], weights[row],
         )  # fmt: skip
 
 
-def axes_of(dna: Dna) -> Doubles:
-    """float64[3, 3] from the file's axes and unit to glTF's: metres, y up, z to the front."""
+def axes_of(dna: Dna, *, faces_back: bool = False) -> Doubles:
+    """float64[3, 3] from the file's axes and unit to glTF's: metres, y up, z to the front.
+
+    Args:
+        dna: says its axes.
+        faces_back: the face looks against z, as VRM 0.x has it.
+    """
     words = dna.coordinate_system
     known = all(word in _AXES for word in words)
     columns = [_AXES[word] for word in (words if known else ("right", "up", "front"))]
-    return np.array(columns, np.float64).T * _METRES.get(dna.translation_unit, 0.01)
+    axes = np.array(columns, np.float64).T * _METRES.get(dna.translation_unit, 0.01)
+    return np.diag([-1.0, 1.0, -1.0]) @ axes if faces_back else axes
 
 
 def unit(vectors: Doubles) -> Doubles:

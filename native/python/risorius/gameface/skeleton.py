@@ -1,28 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""The few joints of a game face: root, neck, head, jaw and eyes, wherever the face has them."""
+"""The joints of a game face: root, neck, head, jaw and eyes, or the bones of a humanoid."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from .._native import Dna
 from ..author.geometry.skeleton import world_matrices
+from ..base.words import joined
+from .avatar import humanoid
+from .errors import GameFaceError
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-# What clients call a joint, and what faces call it; the first in the tree counts.
-_JOINTS = (
-    ("Neck", re.compile(r"neck([_.]?0?1)?$")),
-    ("Head", re.compile(r"head$")),
-    ("Jaw", re.compile(r"(facial_c_)?jaw$")),
-    ("LeftEye", re.compile(r"(facial_l_eye|eye_?l(eft)?|left_?eye)$")),
-    ("RightEye", re.compile(r"(facial_r_eye|eye_?r(ight)?|right_?eye)$")),
-)
+# What faces call the joints that each of them may have; the first in the file counts.
+_JOINTS = {
+    "neck": re.compile(r"neck([_.]?0?1)?$"),
+    "head": re.compile(r"head$"),
+    "jaw": re.compile(r"(facial_c_)?jaw$"),
+    "leftEye": re.compile(r"(facial_l_eye|eye_?l(eft)?|left_?eye)$"),
+    "rightEye": re.compile(r"(facial_r_eye|eye_?r(ight)?|right_?eye)$"),
+}
+ROOT = {"mixamo": "Armature"}  # as TalkingHead looks for it
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,8 @@ class Skeleton:
     places: float64[n, 3], metres, in the axes of glTF.
     of_joint: int64[joints of the file], which of these each hangs on.
     head: the joint that takes what hangs on none.
+    turns: float64[n, 3, 3], from each joint's axes to those of glTF.
+    bones: VRM's name of a bone -> its joint here.
     """
 
     names: list[str]
@@ -40,28 +48,99 @@ class Skeleton:
     places: Doubles
     of_joint: Ints
     head: int
+    turns: Doubles
+    bones: dict[str, int] = field(default_factory=dict)
 
 
-def find_skeleton(dna: Dna, axes: Doubles) -> Skeleton:
-    """Args: dna: with its joints; axes: float64[3, 3] from the file's to those of glTF."""
-    found: dict[int, str] = {}
-    for name, pattern in _JOINTS:
-        at = [i for i, joint in enumerate(dna.joint_names) if pattern.match(joint.lower())]
-        if at and at[0] not in found:
-            found[at[0]] = name
+def find_skeleton(
+    dna: Dna, axes: Doubles, *, kind: str = "", is_body: bool = False, is_turned: bool = False
+) -> Skeleton:
+    """The joints of a face.
+
+    Args:
+        dna: with its joints.
+        axes: float64[3, 3] from the file's to those of glTF.
+        kind: of humanoid.KINDS: bones that the face lacks are made up; "": it has what it has.
+        is_body: the body's bones too, where the face has them.
+        is_turned: bones lie as Mixamo's do.
+
+    Raises:
+        GameFaceError: a humanoid is wished, and the face has no head, or lacks bones.
+    """
+    found = _own(dna, is_body=is_body or bool(kind))
+    if kind and "head" not in found:
+        raise GameFaceError("a joint called head was expected, which a humanoid hangs on")
     parents = np.asarray(dna.joint_parents, np.int64)
     world = world_matrices(dna, np.zeros((len(parents), 9)))[:, :3, 3] @ axes.T
     # Parents of a file stand before their children or behind them: each is followed to the root.
     chains = [_chain(parents, joint) for joint in range(len(parents))]
-    order = sorted(found, key=lambda joint: len(chains[joint]))
-    numbers = {joint: i + 1 for i, joint in enumerate(order)}
-    names = ["Root", *(found[joint] for joint in order)]
-    of_joint = np.array(
-        [next((numbers[j] for j in chain if j in numbers), 0) for chain in chains], np.int64
+    if is_body or kind:
+        bones, above = _humanoid(found, kind)
+    else:
+        of_joint = {joint: name for name, joint in found.items()}
+        bones = sorted(found, key=lambda name: len(chains[found[name]]))
+        above = [_first(chains[found[name]][1:], of_joint, "") for name in bones]
+    number = {name: i + 1 for i, name in enumerate(bones)}
+    joints = {joint: number[name] for name, joint in found.items()}
+    trunk = _first(["hips", "spine", "chest", "upperChest", "neck"], found, found.get("head", 0))
+    places, turns = [np.zeros(3)], [np.eye(3)]
+    for name in bones:
+        own = found.get(name)
+        made = own is None
+        places.append(
+            humanoid.place_of(name, world[found["head"]], world[trunk]) if made else world[own]
+        )
+        turns.append(humanoid.turn_of(name) if is_turned else np.eye(3))
+    rest = number.get(humanoid.parent_of("neck", bones), 0)  # of what hangs on none of them
+    return Skeleton(
+        [ROOT.get(kind, "Root"), *(humanoid.BONES[name].node for name in bones)],
+        [-1, *(number.get(name, 0) for name in above)],
+        np.array(places),
+        np.array([_first(chain, joints, rest) for chain in chains], np.int64),
+        number.get("head", 0),
+        np.array(turns),
+        number,
     )
-    ours = [-1, *(next((numbers[j] for j in chains[o][1:] if j in numbers), 0) for o in order)]
-    places = np.concatenate([np.zeros((1, 3)), world[order].reshape(-1, 3)])
-    return Skeleton(names, ours, places, of_joint, names.index("Head") if "Head" in names else 0)
+
+
+def facing_back(skeleton: Skeleton) -> Skeleton:
+    """The same, turned about the vertical: VRM 0.x looks against z. Args: skeleton: upright."""
+    return replace(skeleton, places=skeleton.places * [-1.0, 1.0, -1.0])
+
+
+def _own(dna: Dna, *, is_body: bool) -> dict[str, int]:
+    """Bones that the joints of a face are: name -> joint."""
+    found: dict[str, int] = {}
+    for name, pattern in _JOINTS.items():
+        at = [i for i, joint in enumerate(dna.joint_names) if pattern.match(joint.lower())]
+        if at and at[0] not in found.values():
+            found[name] = at[0]
+    if is_body:
+        for joint, called in enumerate(dna.joint_names):
+            name = humanoid.bone_of(called)
+            if name and joint not in found.values():
+                found.setdefault(name, joint)
+    return found
+
+
+def _humanoid(found: Mapping[str, int], kind: str) -> tuple[list[str], list[str]]:
+    """The bones of a humanoid, and what each of them hangs on.
+
+    Raises:
+        GameFaceError: the face lacks some, and none is made up.
+    """
+    bones = humanoid.wanted(found, kind)
+    if missing := [name for name in humanoid.NEEDED if name not in bones]:
+        raise GameFaceError(
+            f"a humanoid has {len(humanoid.NEEDED)} bones, the face has no {joined(missing)}: "
+            "--humanoid minimal makes them up"
+        )
+    return bones, [humanoid.parent_of(name, bones) for name in bones]
+
+
+def _first(keys: Iterable[Any], table: Mapping[Any, Any], otherwise: Any) -> Any:
+    """What a table says of the first of several keys that it has."""
+    return next((table[key] for key in keys if key in table), otherwise)
 
 
 def _chain(parents: Ints, joint: int) -> list[int]:

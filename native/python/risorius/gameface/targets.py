@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,17 +13,13 @@ from .. import expressions
 from .._native import Rig
 from ..base.words import counted, joined
 from ..controls import arkit, vocabulary
+from .avatar.vrm import PRESETS
 from .errors import GameFaceError
+from .naming import safe, unlike
 
 Floats = npt.NDArray[np.float32]
 
 GROUPS = ("arkit", "visemes", "vrm", "expressions", "all")
-VRM = (
-    "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh",
-    "blink", "blinkLeft", "blinkRight", "lookUp", "lookDown", "lookLeft", "lookRight",
-)  # fmt: skip
-"""The presets of VRM 1.0."""
-_UNSAFE = re.compile(r"[^\w+\- ]")  # three.js and Unreal take dots, brackets and slashes for paths
 _LISTED = 6
 
 
@@ -70,17 +65,13 @@ def find_targets(rig: Rig, groups: Sequence[str], face: str) -> tuple[list[Targe
 
 
 def _free(name: str, group: str, taken: set[str], notes: list[str]) -> str:
-    """A name that every client reads and no other target has."""
-    safe = _UNSAFE.sub("_", name) or "_"
-    if safe != name:
-        notes.append(f"{name}: no client reads such a name: the target is {safe}")
-    if safe in taken:
-        safe = f"{group}_{safe}"
-    number, free = 2, safe
-    while free in taken:
-        number, free = number + 1, f"{safe}_{number}"
-    taken.add(free)
-    return free
+    """A name that every client reads and no other target has: Unreal takes eyes for Eyes."""
+    free = safe(name)
+    if free != name:
+        notes.append(f"{name}: no client reads such a name: the target is {free}")
+    if free.lower() in taken:
+        free = f"{group}_{free}"
+    return unlike(free, taken)
 
 
 class _Finder:
@@ -155,7 +146,7 @@ def _rows(group: str) -> Iterator[tuple[str, Mapping[str, float]]]:
     library = expressions.load()
     if group == "vrm":
         presets = vocabulary.vocabulary("vrm").meanings
-        for name in VRM:
+        for name in PRESETS:
             said = presets["Neutral" if name == "neutral" else _spelled(name)]
             own = library.get(said.expression)
             yield name, own.weights if own else said.controls

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 TEXTURES = 1024
 
@@ -24,6 +25,10 @@ class Wishes:
         most: targets that the client takes, None: any number.
         within: millimetres that sums of two may deviate; the driver adds what is missing. None: no
             driver.
+        frames: of typical captures, unit of ARKit -> weight: combinations are fitted to them too.
+        humanoid: of avatar.humanoid.KINDS: missing bones are made up; "": none.
+        vrm: 1.0 or 0.x, "": a glTF that is no VRM.
+        licence: fields of a VRM, as avatar.licence asks for them.
     """
 
     shapes: Sequence[str] = ("arkit", "visemes")
@@ -37,3 +42,7 @@ class Wishes:
     mb: float | None = None
     most: int | None = None
     within: float | None = None
+    frames: Sequence[Mapping[str, float]] = ()
+    humanoid: str = ""
+    vrm: str = ""
+    licence: Mapping[str, Any] = field(default_factory=dict)

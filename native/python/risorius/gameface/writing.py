@@ -10,9 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .avatar import vrm
 from .glb import QUANTIZED, Glb
 from .materials import Materials
-from .parts import Part, Points, normals_of
+from .naming import unlike
+from .parts import INFLUENCES, Part, Points, normals_of
 from .skeleton import Skeleton
 from .wishes import Wishes
 
@@ -21,6 +23,7 @@ Floats = npt.NDArray[np.float32]
 
 _STEPS = 32767  # whole numbers to each side of the middle of a quantized face
 _TURNED = 127.0
+_REACHES = 0.2  # metres: meshes that end so near to the feet stand on them
 _LEAST_TURN = 1e-3  # a change of a normal below a sixteenth of a degree is none
 
 
@@ -49,6 +52,7 @@ def write(
     materials: Materials,
     changes: Sequence[Change],
     wishes: Wishes,
+    manner: vrm.Manner,
 ) -> Written:
     """The file.
 
@@ -58,9 +62,11 @@ def write(
         materials: of the face.
         changes: the targets in the order in which meshes have them.
         wishes: how lists are kept.
+        manner: of the face, for a VRM.
     """
     farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
-    return _Writer(points, skeleton, materials, wishes, farthest).file(changes)
+    writer = _Writer(points, skeleton, materials, wishes, farthest)
+    return writer.file(changes, manner)
 
 
 class _Writer:
@@ -82,43 +88,110 @@ class _Writer:
         self.names: dict[str, set[str]] = {}
         self.moved: dict[str, npt.NDArray[np.bool_]] = {}
 
-    def file(self, changes: Sequence[Change]) -> Written:
+    def file(self, changes: Sequence[Change], manner: vrm.Manner) -> Written:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = [self._joints(nodes)] if self.wishes.skeleton else []
+        # TalkingHead looks for meshes below the armature; elsewhere nothing stands above a skin.
+        below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
+        shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
-        names: set[str] = set()
+        names = {node["name"].lower() for node in nodes}
         for part in self.points.parts:
             mesh = self._mesh(part, changes, part is whole)
-            name = _unlike(part.name, names)
+            name = unlike(part.name, names)
             table.setdefault("meshes", []).append({"name": name, **mesh})
             node: dict[str, Any] = {"name": name, "mesh": len(table["meshes"]) - 1}
             if self.wishes.skeleton:
                 node["skin"] = 0
             elif self.wishes.quantize:
                 node.update(scale=[self.step] * 3, translation=self.middle.tolist())
-            roots.append(len(nodes))
+            below.append(len(nodes))
+            named = mesh.get("extras", {}).get("targetNames", [])
+            shown.append(vrm.Shown(len(nodes), node["mesh"], named, self._first_person(part)))
             nodes.append(node)
+        if self.wishes.humanoid == "mixamo":
+            self._add_soles(below)
         table.update(scene=0, scenes=[{"name": "Face", "nodes": roots}])
+        if self.wishes.vrm:
+            self._make_vrm(shown, changes, manner)
         groups = {
             group: (len(self.names[group]), int(self.moved[group].sum()), size)
             for group, size in self.bytes.items()
         }
         return Written(self.glb.data(), groups)
 
+    def _make_vrm(
+        self, shown: Sequence[vrm.Shown], changes: Sequence[Change], manner: vrm.Manner
+    ) -> None:
+        own, table = self.skeleton, self.glb.table
+        head, eyes = own.places[own.head], [own.bones.get(f"{s}Eye") for s in ("left", "right")]
+        known = [own.places[eye] for eye in eyes if eye is not None]
+        avatar = vrm.Avatar(
+            own.bones,  # nodes of joints come first, so their numbers are those of the joints
+            (np.mean(known, axis=0) - head).tolist() if known else [0.0, 0.0, 0.0],
+            shown,
+            [c.name for c in changes if c.group not in ("vrm", "combinations")],
+            self.wishes.licence,
+            manner,
+        )
+        name, made = vrm.extension(self.wishes.vrm, avatar, table.get("materials", []))
+        table.setdefault("extensions", {})[name] = made
+        self.glb.uses(name, required=False)
+
+    def _add_soles(self, below: list[int]) -> None:
+        """Two triangles of a millimetre where a body without meshes stands: TalkingHead lowers an
+        avatar until its lowest vertex is on the ground, and a head alone would sink into it."""
+        own, table = self.skeleton, self.glb.table
+        feet = [own.bones[f"{side}Toes"] for side in ("left", "right")]
+        if self.points.rest[:, 1].min() < own.places[feet, 1].max() + _REACHES:
+            return
+        corners = np.array([[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]])
+        places = (own.places[feet][:, None] + corners).reshape(-1, 3) - self.middle
+        joints = np.zeros((6, INFLUENCES), "u1")
+        joints[:, 0] = np.repeat(feet, 3)
+        primitive = {
+            "attributes": {
+                "POSITION": self.glb.vertices((places / self.step).astype("<f4"), bounds=True),
+                "JOINTS_0": self.glb.vertices(joints),
+                "WEIGHTS_0": self._weights(np.eye(1, INFLUENCES).repeat(6, axis=0)),
+            },
+            "indices": self.glb.corners(np.arange(6).reshape(2, 3), 6),
+        }
+        table["meshes"].append({"name": "Soles", "primitives": [primitive]})
+        below.append(len(table["nodes"]))
+        table["nodes"].append({"name": "Soles", "mesh": len(table["meshes"]) - 1, "skin": 0})
+
+    def _first_person(self, part: Part) -> str:
+        """Whether the owner of the head sees a mesh: of one that ends at the neck, a part."""
+        own = self.skeleton
+        is_head = np.zeros(max(len(own.names), INFLUENCES), np.bool_)
+        for joint in range(len(own.names)):
+            above = own.parents[joint]
+            is_head[joint] = joint == own.head or (above >= 0 and is_head[above])
+        on = is_head[part.joints][part.weights > 0]
+        return "thirdPersonOnly" if on.all() else "auto" if on.any() else "both"
+
     def _joints(self, nodes: list[dict[str, Any]]) -> int:
         """The number of the root's node."""
         own, first = self.skeleton, len(nodes)
         for i, name in enumerate(own.names):
-            above = own.places[own.parents[i]] if own.parents[i] >= 0 else np.zeros(3)
-            node: dict[str, Any] = {"name": name, "translation": (own.places[i] - above).tolist()}
+            parent = own.parents[i]
+            above = own.places[parent] if parent >= 0 else np.zeros(3)
+            turn = own.turns[parent] if parent >= 0 else np.eye(3)
+            place = turn.T @ (own.places[i] - above)
+            node: dict[str, Any] = {"name": name, "translation": place.tolist()}
+            quaternion = _quaternion(turn.T @ own.turns[i])
+            if quaternion != [0, 0, 0, 1]:
+                node["rotation"] = quaternion
             below = [first + j for j, parent in enumerate(own.parents) if parent == i]
             if below:
                 node["children"] = below
             nodes.append(node)
         inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
-        inverse[:, :3, :3] *= self.step  # what a skin turns has no node that would scale it
-        inverse[:, :3, 3] = self.middle - own.places
+        back = np.swapaxes(own.turns, 1, 2)
+        inverse[:, :3, :3] = back * self.step  # what a skin turns has no node that would scale it
+        inverse[:, :3, 3] = np.einsum("jab,jb->ja", back, self.middle - own.places)
         joints = [first + i for i in range(len(own.names))]
         self.glb.table["skins"] = [
             {"joints": joints, "skeleton": first, "inverseBindMatrices": self.glb.matrices(inverse)}
@@ -200,10 +273,17 @@ class _Writer:
         return self.glb.vertices(np.rint(values * 255).astype("u1"), normalized=True)
 
 
-def _unlike(name: str, names: set[str]) -> str:
-    """A name that no other mesh has."""
-    free, number = name, 2
-    while free in names:
-        free, number = f"{name}_{number}", number + 1
-    names.add(free)
-    return free
+def _quaternion(turn: Doubles) -> list[float]:
+    """x, y, z, w of a rotation matrix."""
+    x, y, z = np.diag(turn)
+    squares = np.array([1 + x - y - z, 1 - x + y - z, 1 - x - y + z, 1 + x + y + z])
+    largest = int(squares.argmax())  # the others are divided by it
+    m = turn
+    rows = (
+        (squares[0], m[0, 1] + m[1, 0], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]),
+        (m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]),
+        (m[2, 0] + m[0, 2], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]),
+        (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]),
+    )
+    row = np.array(rows[largest]) / (2 * np.sqrt(squares[largest]))
+    return [float(v) + 0.0 for v in row / np.linalg.norm(row)]

@@ -22,7 +22,7 @@ from .mapping import (
 from .ranges import ANGLE_UNITS
 from .reading import KINDS, ROTATIONS, Imported, import_curves, import_file, read
 from .report import Report
-from .writing import csv_text, json_text, mapping_with, write_text
+from .writing import csv_text, curve_table_text, json_text, mapping_with, write_text
 
 __all__ = [
     "ANGLE_UNITS",
@@ -37,6 +37,7 @@ __all__ = [
     "best_mapping",
     "check",
     "csv_text",
+    "curve_table_text",
     "import_curves",
     "import_file",
     "json_text",

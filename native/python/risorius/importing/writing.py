@@ -8,6 +8,7 @@ import csv
 import io
 import json
 import os
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,6 +19,8 @@ from ..base import toml
 from ..base.errors import ArgumentError
 from ..files import fileio
 from .mapping import load_mapping, mapping_names
+
+_UNREAL = re.compile(r"""[\s"',./:|&!~@#(){}\[\]=;^%$`]""")  # no name of Unreal's holds these
 
 
 def csv_text(clip: Clip) -> str:
@@ -60,6 +63,39 @@ def json_text(clip: Clip) -> str:
     ]
     body = ",\n    ".join(rows)
     return json.dumps(head, indent=2)[:-2] + f',\n  "curves": {{\n    {body}\n  }}\n}}\n'
+
+
+def curve_table_text(clip: Clip, *, is_json: bool) -> str:
+    """A curve table as Unreal Engine imports it: a row for each curve, a column for each time.
+
+    A control is called as the curves of MetaHuman animations are: CTRL_expressions_jawOpen.
+
+    Args:
+        clip: of raw controls.
+        is_json: the rows as JSON; else as CSV, whose first cell Unreal passes over.
+
+    Raises:
+        ValueError: a value that is not finite, or two controls that get one name.
+    """
+    _check_finite(clip, "a curve table")
+    names = [_UNREAL.sub("_", name) for name in clip.names]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise ArgumentError(f"{twice[0]}: curves of other names were expected, several get this")
+    times = [f"{time:.6f}".rstrip("0").rstrip(".") for time in clip.frame_times().tolist()]
+    rows = [list(map(_shortest, curve)) for curve in clip.curves]
+    if is_json:
+        lines = (
+            ", ".join(f'"{time}": {value}' for time, value in zip(times, row, strict=True))
+            for row in rows
+        )
+        pairs = zip(names, lines, strict=True)
+        body = ",\n".join(f'  {{"Name": {json.dumps(name)}, {line}}}' for name, line in pairs)
+        return f"[\n{body}\n]\n"
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["---", *times])
+    writer.writerows([name, *row] for name, row in zip(names, rows, strict=True))
+    return out.getvalue()
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:

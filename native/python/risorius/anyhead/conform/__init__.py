@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A DNA file's own topology on another head: everything that a face has takes that head's form."""
+"""Conform a face (a DNA file) to another head: the mesh topology, names and counts stay."""
 
 from .face import conform
 from .head import Conformed, conform_face, is_same_topology

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How the form of a skin changes from one head to another, at each vertex and beside it.
+"""The deformation of a skin mesh from its own head (source) to another head (target).
 
-The local change of form (Sumner and Popovic, "Deformation Transfer for Triangle Meshes", 2004, as
-a matrix at each vertex) is evened out over some centimetres: it says how long a lid or a lip is on
-the other head, not how each wrinkle of it lies.
+Each vertex has a deformation gradient (Sumner and Popovic, "Deformation Transfer for Triangle
+Meshes", 2004). The gradients are smoothed over about 2 cm, because expressions scale with the size
+of a lid or a lip and not with the direction of single wrinkles.
 """
 
 from __future__ import annotations
@@ -22,20 +22,26 @@ from ...author.geometry.skeleton import Doubles, Ints
 from ..surface import Surface
 
 _EVENED = 0.24  # of the skin's spread, which is 8.4 cm of a head of 24: 2 cm
-_CELL = 0.4  # of that: vertices so close are one to the others
+_CELL = 0.4  # of that: edge length of the grid cells that the smoothing sums up first
 _STEADY = 1e-6
-_NORMAL = 0.25  # of the squares of edges: how much the normal counts, whose stretch nobody sees
+_NORMAL = 0.25  # weight of the normal; edges do not measure the stretch along it
 _AT_ONCE = 1024
-# The same place of the texture counts where it is not much farther than the nearest place: times,
-# and of the reach; _SAME_TEXEL of the texture's width.
+# The point with the same texture coordinates is taken if its distance is at most _LONGER times the
+# distance of the closest point plus _BESIDE times the reach. _SAME_TEXEL: share of the UV square.
 _LONGER, _BESIDE, _SAME_TEXEL = 2.0, 0.2, 2e-3
-_NO_TEXTURE = 1e-6  # a texture as small as that is none
-_TURNED = 0.5  # what a turn leaves of the difference at most, where the head is turned
+_NO_TEXTURE = 1e-6  # texture coordinates with a smaller extent are unusable
+_TURNED = 0.5  # a rotation counts if it leaves at most this share of the RMS difference
 
 
 @dataclass(frozen=True)
 class Similar:
-    """A scaled turn about a point, and where the point comes to: float64[3, 3], float64[3]."""
+    """A similarity transform.
+
+    Attributes:
+        linear: float64[3, 3], rotation times scale.
+        middle: float64[3], a point of the source head.
+        becomes: float64[3], the position of that point on the target head.
+    """
 
     linear: Doubles
     middle: Doubles
@@ -43,22 +49,22 @@ class Similar:
 
     @property
     def size(self) -> float:
-        """What lengths are multiplied with."""
+        """The scale factor."""
         return float(np.cbrt(max(np.linalg.det(self.linear), 0.0)))
 
     def __call__(self, points: Doubles) -> Doubles:
-        """float64[n, 3] of float64[n, 3]."""
+        """Transform points: float64[n, 3] -> float64[n, 3]."""
         return self.becomes + (points - self.middle) @ self.linear.T
 
 
 @dataclass(frozen=True)
 class Hold:
-    """Points that a skin holds: the triangle nearest to each, and the place on it.
+    """Points bound to a skin: a triangle, a point on it, and the offset from there.
 
     Attributes:
-        triangle: int64[n].
-        shares: float64[n, 3], barycentric.
-        away: float64[n, 3], from that place to the point.
+        triangle: int64[n], a triangle of the skin for each point.
+        shares: float64[n, 3], barycentric coordinates in the triangle.
+        away: float64[n, 3], the offset from the point on the triangle to the bound point.
     """
 
     triangle: Ints
@@ -67,32 +73,34 @@ class Hold:
 
 
 def surface_of(mesh: Mesh, points: Doubles) -> Surface:
-    """The mesh with its vertices at other places.
+    """The triangles of a mesh with other vertex positions.
 
     Args:
-        mesh: has the polygons.
-        points: float64[V, 3].
+        mesh: gives the polygons.
+        points: float64[V, 3], the vertex positions.
     """
     places = np.asarray(mesh.layout_positions, np.int64)
     return Surface(points, places[fan_triangles(mesh)])
 
 
 class Change:
-    """From a skin to the same skin on another head.
+    """The deformation from the source head to the target head.
 
     Attributes:
-        before, after: the skin of either head.
-        turn: float64[3, 3], the rotation that the second head is turned by.
-        linear: float64[V, 3, 3], the evened change of form at each vertex.
+        before, after: the skin on the source head and on the target head.
+        turn: float64[3, 3], the rotation of the whole target head against the source head.
+        size: the scale of the whole target head.
+        reach: the smoothing radius in the file's unit, 2 cm on a head of 24 cm.
+        linear: float64[V, 3, 3], the smoothed deformation gradient of each vertex.
     """
 
     def __init__(self, mesh: Mesh, before: Doubles, after: Doubles) -> None:
-        """Compares two heads.
+        """Compute the gradients.
 
         Args:
-            mesh: has the polygons.
-            before: float64[V, 3], on the one.
-            after: float64[V, 3], on the other one.
+            mesh: gives the polygons.
+            before: float64[V, 3], vertex positions on the source head.
+            after: float64[V, 3], vertex positions on the target head.
         """
         self.before, self.after = surface_of(mesh, before), surface_of(mesh, after)
         coordinates = np.asarray(mesh.layout_texture_coordinates, np.int64)
@@ -130,7 +138,7 @@ class Change:
         return out
 
     def _spread(self, rows: Doubles) -> Doubles:
-        """Sums over the vertices around each, which count less the farther off they are."""
+        """float64[V, n]: Gaussian sums of the rows of neighbouring vertices."""
         points = self.before.points
         at = np.floor((points - points.min(axis=0)) / (_CELL * self.reach)).astype(np.int64)
         at = np.ravel_multi_index(tuple(at.T), tuple(at.max(axis=0) + 1))
@@ -145,7 +153,7 @@ class Change:
         return out
 
     def _near(self, points: Doubles, others: Doubles) -> Doubles:
-        """float64[n, m]: how much each of the others counts at each point."""
+        """float64[n, m]: Gaussian weights between points."""
         square = (points**2).sum(axis=1)[:, None] + (others**2).sum(axis=1) - 2 * points @ others.T
         return np.exp(-np.maximum(square, 0.0) / (2 * self.reach**2))
 
@@ -155,21 +163,21 @@ class Change:
 
     @cached_property
     def _texture(self) -> _native.ClosestPoints | None:
-        """The skin laid flat as its texture is; None: it has none."""
+        """The triangles in texture space; None if the texture coordinates are unusable."""
         rows, corners = self._flat
         if not len(rows) or np.ptp(rows, axis=0).max() < _NO_TEXTURE:
             return None
         return _native.ClosestPoints(rows, corners.astype(np.int32))
 
     def hold(self, points: Doubles, mesh: Mesh | None = None) -> Hold:
-        """Where the skin of the first head holds points that lie near it.
+        """Bind points to the skin of the source head.
 
-        Lips and lids lie on each other, so the nearest place may be on the wrong one: places that
-        look the same way go first, and the same place of the texture where it is near enough.
+        The closest point may lie on the wrong lip or lid. Triangles with a similar normal are
+        therefore preferred, and points with the same texture coordinates if they are close enough.
 
         Args:
             points: float64[n, 3].
-            mesh: whose vertices the points are; None: they look no way.
+            mesh: the mesh that the points are the vertices of; None: points without normals.
         """
         found, places, far = self._closest.nearest(points)
         triangle, shares = found.astype(np.int64), np.asarray(places)
@@ -186,8 +194,8 @@ class Change:
         return Hold(triangle, shares, points - self.before.at(triangle, shares))
 
     def _by_texture(self, mesh: Mesh) -> tuple[Ints, Doubles]:
-        """int64[V], float64[V, 3]: the triangle that has a vertex' place of the texture, -1: none
-        has, and the place in it."""
+        """int64[V], float64[V, 3]: for each vertex of a mesh the skin triangle that contains its
+        texture coordinates (-1: no triangle does), and the barycentric coordinates."""
         count = len(mesh.positions)
         none = np.full(count, -1), np.full((count, 3), 1 / 3)
         rows = _flat(np.asarray(mesh.texture_coordinates, np.float64))
@@ -201,38 +209,38 @@ class Change:
         return triangle, np.where(triangle[:, None] >= 0, np.asarray(places), none[1])
 
     def sees(self, points: Doubles, ways: Doubles, far: float) -> npt.NDArray[np.bool_]:
-        """bool[n]: whether no skin of the first head lies before its own points.
+        """bool[n]: True if a ray from a skin point hits no skin of the source head.
 
         Args:
-            points: float64[n, 3], of the skin.
-            ways: float64[n, 3], directions of length 1.
-            far: how far they look.
+            points: float64[n, 3], on the skin.
+            ways: float64[n, 3], unit directions of the rays.
+            far: the length of the rays.
         """
         triangle, _, _ = self._closest.first_hit(points + 1e-3 * far * ways, ways, far)
         return np.asarray(triangle < 0)
 
     def at(self, hold: Hold) -> Doubles:
-        """float64[n, 3, 3]: the change of form where points are held."""
+        """float64[n, 3, 3]: the deformation gradient at bound points."""
         corners = self.before.triangles[hold.triangle]
         return np.einsum("nk,nkij->nij", hold.shares, self.linear[corners])
 
     def carried(self, hold: Hold, linear: Doubles | None = None) -> Doubles:
-        """float64[n, 3]: where the skin of the second head brings the points.
+        """float64[n, 3]: positions of bound points on the target head.
 
         Args:
-            hold: of the points.
-            linear: float64[n, 3, 3] of them, as `at` gives it.
+            hold: the binding of the points.
+            linear: float64[n, 3, 3], the result of `at` for the same points; None: computed here.
         """
         linear = self.at(hold) if linear is None else linear
         there = self.after.at(hold.triangle, hold.shares)
         return there + np.einsum("nij,nj->ni", linear, hold.away)
 
     def around(self, middle: Doubles, reach: float) -> Similar:
-        """The similarity that fits the skin around a point best.
+        """The similarity transform of the skin around a point.
 
         Args:
-            middle: float64[3].
-            reach: vertices as far away count for e^-0.5.
+            middle: float64[3], the point.
+            reach: standard deviation of the Gaussian weights of the vertices.
         """
         square = ((self.before.points - middle) ** 2).sum(axis=1)
         share = np.exp(-(square - square.min()) / (2 * reach**2))
@@ -244,11 +252,11 @@ class Change:
 
 
 def similar(before: Doubles, after: Doubles, change: Change) -> Similar:
-    """The similarity that fits points best, with the turn of the whole head.
+    """The least-squares similarity between points, with the rotation of the whole head.
 
     Args:
-        before, after: float64[n, 3].
-        change: of the head.
+        before, after: float64[n, 3], positions on the source and the target head.
+        change: gives the rotation.
     """
     a, b = before.mean(axis=0), after.mean(axis=0)
     square = max(float(((before - a) ** 2).sum()), 1e-300)
@@ -257,13 +265,13 @@ def similar(before: Doubles, after: Doubles, change: Change) -> Similar:
 
 
 def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
-    """The rotation of a head that is turned, float64[3, 3], and how much larger it is.
+    """The rotation (float64[3, 3]) and the scale of the whole target head.
 
-    Heads of another form fit each other better after some small turn, as a longer chin counts: that
-    is form. A turn is one only where it explains most of the difference.
+    A longer chin alone makes a small rotation fit better, and such a rotation is part of the form.
+    A rotation is therefore returned only if it explains most of the difference.
 
     Args:
-        before, after: float64[n, 3].
+        before, after: float64[n, 3], vertex positions on the source and the target head.
     """
     turn, _ = rigid_fit(before, after)
     a, b = before - before.mean(axis=0), after - after.mean(axis=0)
@@ -278,7 +286,7 @@ def turn_of(before: Doubles, after: Doubles) -> tuple[Doubles, float]:
 
 
 def _flat(coordinates: Doubles) -> Doubles:
-    """float64[n, 3] of texture coordinates float64[n, 2]; none where one is no number."""
+    """float64[n, 3]: texture coordinates with z = 0; empty if one of them is not finite."""
     rows = coordinates.reshape(-1, 2)
     if not np.isfinite(rows).all():
         return np.zeros((0, 3))

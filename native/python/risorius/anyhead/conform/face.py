@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A face of another form: each layer of a DNA file follows where the vertices of its skin lie.
+"""Conform every layer of a DNA file to new vertex positions of its skin.
 
-Names, counts and layers stay, so a program that takes the old file takes the new one.
+Names, counts and layers stay, so that a program that reads the old file also reads the new one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
 from ..errors import Stopped
-from .change import Change, similar, surface_of
+from .change import Change, Hold, similar, surface_of
+from .contacts import keep_contacts
 from .joints import Places, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
@@ -25,11 +26,18 @@ Progress = Callable[[float], object]  # told the share that is done, 0 to 1; Fal
 
 
 class Moved(NamedTuple):
-    """A mesh on both heads: float64[V, 3], float64[V, 3], float64[V, 3, 3]."""
+    """A mesh on both heads.
+
+    Attributes:
+        before, after: float64[V, 3], vertex positions on the source and the target head.
+        linear: float64[V, 3, 3], deformation gradients.
+        hold: the binding to the skin; None for the skin itself and for rigid parts.
+    """
 
     before: Doubles
     after: Doubles
     linear: Doubles
+    hold: Hold | None = None
 
 
 def conform(
@@ -38,23 +46,24 @@ def conform(
     progress: Progress | None = None,
     balls: Sequence[Ball] = (),
 ) -> Dna:
-    """The face with another head's form: the same names, counts and layers.
+    """Conform a face to the vertex positions of another head.
 
-    Meshes that `moved` does not name follow the skin: what lies on it by the nearest place, eyes as
-    spheres in their lids, teeth and tongue as one piece. Joints follow what they carry, blend
-    shapes and shifts of joints the local change of form. What turns joints, and layers of solvers
-    and networks, stay as they are.
+    Meshes that `moved` does not name follow the skin: lashes and coarser LODs are bound to the
+    closest point, each eye keeps its shape and is fitted into the lids, and teeth and tongue move
+    as one rigid part. A joint follows the skin that it carries. Blend shapes and joint translations
+    are transformed by the deformation gradients. Joint rotations and the layers of solvers and
+    networks stay unchanged. Controls that close the lids are adjusted until the lids meet again.
 
     Args:
-        dna: stays as it is.
-        moved: float64[V, 3] by mesh name, in the file's axes and unit: where vertices lie now;
-            the skin of LOD 0 at least.
+        dna: the source face; it is not changed.
+        moved: float64[V, 3] by mesh name, the new vertex positions in the axes and the unit of the
+            file; the skin of LOD 0 is required.
         progress: told the share that is done, 0 to 1; False stops.
-        balls: eyes of the other head, which those of the face take the places of.
+        balls: eyeballs of the target head; each eye of the face moves to the one near it.
 
     Raises:
-        ArgumentError: the face has no skin, or `moved` lacks it, names another mesh, or has
-            places of another number or that are no places.
+        ArgumentError: the face has no skin mesh, or `moved` lacks the skin, names an unknown mesh,
+            or has a wrong number of positions or a position that is not finite.
         Stopped: progress said False.
     """
     tell = telling(progress, 0.0, 1.0)
@@ -69,26 +78,31 @@ def conform(
     for m in range(min(len(dna.meshes), len(dna.mesh_names))):
         if len(dna.meshes[m].positions):
             meshes[m] = _moved(dna, m, change, stiff, given)
-        tell(0.2 + 0.5 * (m + 1) / len(dna.meshes))
-    places = Places(dna, {m: meshes[m] for m in finest(dna)}, change, stiff)
+        tell(0.2 + 0.3 * (m + 1) / len(dna.meshes))
+    places = Places(dna, {m: meshes[m][:3] for m in finest(dna)}, change, stiff)
     out = copy.copy(dna)
     out.meshes = [
         _mesh(mesh, meshes[m]) if m in meshes else mesh for m, mesh in enumerate(dna.meshes)
     ]
-    tell(0.9)
+    tell(0.5)
     place_joints(out, places, change.turn)
     out.joint_groups = shifts_carried(dna, places, change.turn)
+    tell(0.6)
+    rest = telling(progress, 0.6, 1.0)
+    holds = {m: own.hold for m, own in meshes.items() if own.hold is not None}
+    out = keep_contacts(dna, out, skin, change, stiff.eyes, holds, rest)
     tell(1.0)
     return out
 
 
 def telling(progress: Progress | None, begin: float, end: float) -> Callable[[float], bool]:
-    """What tells the progress of a part of the work. Raises: Stopped: it said False.
+    """A function that reports the progress of a part of the work.
+
+    It raises Stopped if `progress` returns False.
 
     Args:
-        progress: of the whole.
-        begin: share of the whole where the part begins.
-        end: where it ends.
+        progress: told the share of the whole work.
+        begin, end: shares of the whole work at which the part begins and ends.
     """
 
     def tell(share: float) -> bool:
@@ -139,7 +153,7 @@ def _moved(dna: Dna, m: int, change: Change, stiff: Stiff, given: Mapping[str, D
 
 
 def _with_eyes(points: Doubles, eyes: Sequence[Eye]) -> Moved:
-    """Each vertex goes with the eye whose middle is nearest."""
+    """Move each vertex with the eye whose centre is closest."""
     far = np.stack([np.linalg.norm(points - eye.middle, axis=1) for eye in eyes])
     own = far.argmin(axis=0)
     after = np.stack([eye.way(points) for eye in eyes])
@@ -148,14 +162,14 @@ def _with_eyes(points: Doubles, eyes: Sequence[Eye]) -> Moved:
 
 
 def _on_skin(mesh: Mesh, points: Doubles, change: Change, eyes: Sequence[Eye]) -> Moved:
-    """Vertices on the nearest place of the skin; those that an eye's joints hold, on the eye."""
+    """Move vertices with the skin, and vertices that belong to an eye (its cornea) with the eye."""
     hold = change.hold(points, mesh)
     linear = change.at(hold)
     after = change.carried(hold, linear)
     for eye in eyes:
         own = stiff_share(mesh, eye.holds)
         after[own], linear[own] = eye.way(points[own]), eye.way.linear
-    return Moved(points, after, linear)
+    return Moved(points, after, linear, hold)
 
 
 def _mesh(mesh: Mesh, moved: Moved) -> Mesh:
@@ -175,7 +189,7 @@ def _target(target: BlendShapeTarget, linear: Doubles) -> BlendShapeTarget:
 
 
 def _normals(mesh: Mesh, moved: Moved) -> Doubles:
-    """float64[N, 3]: the normals of the file, each turned as the surface at its vertex turns."""
+    """float64[N, 3]: the normals of the file, rotated with the vertex normals of the surface."""
     own = np.asarray(mesh.normals, np.float64)
     rows = np.asarray(mesh.layout_normals, np.int64)
     vertex = np.full(len(own), -1)
@@ -190,7 +204,7 @@ def _normals(mesh: Mesh, moved: Moved) -> Doubles:
 
 
 def _turned(vectors: Doubles, start: Doubles, end: Doubles) -> Doubles:
-    """float64[n, 3]: vectors after the shortest turns that bring unit vectors to others."""
+    """float64[n, 3]: vectors after the smallest rotation from one unit vector to another."""
     axis = np.cross(start, end)
     cosine = np.einsum("ni,ni->n", start, end)[:, None]
     crossed = np.cross(axis, vectors)

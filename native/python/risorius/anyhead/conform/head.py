@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A face takes the form of a head: a sculpt of its own topology, or any other mesh."""
+"""Conform a face to a head from a file or another program: a sculpt of the face, or any mesh."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,16 +13,12 @@ from ...author.geometry.rigid import rigid_fit
 from ...author.geometry.skeleton import Doubles
 from ...author.heads.parts import HeadPart, Wishes
 from ...author.heads.sizes import UNITS
-from ...author.heads.turning import take_eyes
 from ...author.input.obj import ObjMesh
 from ...base.words import joined
-from ...web.kinds import kind_of
-from ..errors import AnyHeadError, Stopped
-from ..form.standing import CHIN, TOP
-from ..landmarks.find import Hints, find_form
+from ..errors import AnyHeadError
+from ..fittings.sorting import sort_parts
 from ..landmarks.marks import Landmarks
-from ..landmarks.start import start_of
-from ..registration import RegisterOptions, StoppedError, register
+from ..laying import lay_surface
 from ..standing import Standing, stand
 from ..surface import Surface
 from .change import surface_of
@@ -43,14 +39,14 @@ _STOOD, _LAID = 0.15, 0.75  # shares of the work at whose ends the steps are
 
 @dataclass
 class Conformed:
-    """A face that took the form of a head.
+    """The result of conform_face.
 
     Attributes:
-        dna: the face.
-        moved: float64[V, 3], where its skin lies now.
-        sculpted: the meshes that the head has with the face's own polygons; none where the face's
-            topology was laid onto another.
-        notes: what was guessed and done, a sentence each.
+        dna: the conformed face.
+        moved: float64[V, 3], the vertex positions of its skin.
+        sculpted: names of the meshes that the head has with the topology of the face; empty if the
+            skin was registered onto a head of another topology.
+        notes: sentences about guesses and steps.
     """
 
     dna: Dna
@@ -70,26 +66,27 @@ def conform_face(
     wishes: Wishes | None = None,
     threads: int = 0,
 ) -> Conformed:
-    """The face with the form of a head: the same names, counts and layers.
+    """Conform a face to a head.
 
-    A head that has the face's own polygons, cut into triangles or not, gives the places of their
-    vertices; onto another one the skin of the face is laid, and its own eyes say where eyes are.
-    The face stays where it is: a head of another place, unit or direction comes there.
+    If the head has the topology of the face (also triangulated), its vertex positions are taken
+    directly. The skin of the face is registered onto any other head, and the eyes of the head give
+    the positions of the eyes. The result keeps the axes, the unit and the position of the face.
 
     Args:
-        dna: stays as it is.
+        dna: the source face; it is not changed.
         parts: the meshes of the head in one space.
-        marks: landmarks that a person gave, in the space of the parts.
+        marks: landmarks that the user placed, in the space of the parts.
         progress: told the share that is done, 0 to 1; False stops.
         where: what errors call the head.
-        unit: of the numbers as the format of the head has it, "cm" or "m".
-        wishes: what is said of the head and not guessed.
+        unit: the unit of the head's file format, "cm" or "m".
+        wishes: values that the user gave and that are not guessed.
         threads: 0: one for each core.
 
     Raises:
-        AnyHeadError: no polygons, no skin to the face, or wishes that cannot be.
-        LandmarkError: no face, or landmarks that are missing.
-        RegistrationError: nothing of the head near the face.
+        AnyHeadError: the head has no polygons, the face has no skin, or a value of `wishes` is
+            invalid.
+        LandmarkError: no face was found in the head, or landmarks are missing.
+        RegistrationError: no surface of the head is near the face.
         Stopped: progress said False.
     """
     wishes = wishes or Wishes()
@@ -102,11 +99,11 @@ def conform_face(
     if name in moved:
         if wishes.height_mm:
             raise AnyHeadError(
-                f"{where}: the head has the face's own polygons and is as large as its numbers "
-                "say; scale multiplies them, a height was not expected"
+                f"{where}: a height was given, but the head has the topology of the face and keeps "
+                "its size; use scale instead"
             )
         there, note = into_own_space(dna, moved, wishes.scale or None)
-        notes = [f"{joined(list(there))}: the head has the face's own polygons", note]
+        notes = [f"{joined(list(there))}: the head has the topology of the face", note]
         made = conform(dna, there, telling(progress, 0.0, 1.0))
         return Conformed(made, there[name], list(there), [n for n in notes if n])
     standing = stand(where, parts, unit, wishes, marks)
@@ -117,7 +114,7 @@ def conform_face(
 
 
 def parts_of(dna: Dna) -> list[HeadPart]:
-    """The meshes of LOD 0 of a face, as those of a head.
+    """The meshes of LOD 0 of a face as parts of a head, standing.
 
     Args:
         dna: the face.
@@ -128,75 +125,44 @@ def parts_of(dna: Dna) -> list[HeadPart]:
         corners = np.asarray(mesh.layout_positions, np.int64)[np.asarray(mesh.face_layouts)]
         faces = [own.tolist() for own in np.split(corners, mesh.face_offsets[1:-1])]
         places = np.asarray(mesh.positions, np.float64) @ standing_axes(dna)
-        out.append(HeadPart(name, ObjMesh(places, np.zeros((0, 2)), faces), source=name))
+        bare = ObjMesh(places, np.zeros((0, 2)), faces, [[] for _ in faces])
+        out.append(HeadPart(name, bare, source=name))
     return out
 
 
 def _laid(
     dna: Dna, skin: int, standing: Standing, threads: int, progress: Progress | None
 ) -> tuple[Doubles, list[Ball]]:
-    """Where the vertices of the face's skin lie on a head, and the head's eyeballs; in the axes,
-    the unit and the place of the face."""
+    """The vertex positions of the face's skin on a head, and the eyeballs of the head, in the axes,
+    the unit and the position of the face."""
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     before = np.asarray(dna.meshes[skin].positions, np.float64)
     template = _outward(surface_of(dna.meshes[skin], size * before @ axes))
-    target, balls = _face_of(standing)
-    own = find_form(template, Hints(dna.name or "the face", {}, np.eye(3)[1], np.eye(3)[2]))
-    found = standing.found
-    pairs = [
-        (int(np.square(template.points - p).sum(axis=1).argmin()), found.landmarks.points[n])
-        for n, p in own.landmarks.points.items()
-        if n in found.landmarks.points
-    ]
-    try:
-        laid = register(
-            template,
-            target,
-            [(vertex, point.tolist()) for vertex, point in pairs],
-            RegisterOptions(threads=threads),
-            start_of(template, target, own, found),
-            telling(progress, _STOOD, _LAID),
-        )
-    except StoppedError:
-        raise Stopped from None
+    parts = sort_parts(standing.parts)
+    face = parts.face.mesh
+    target = Surface.of_polygons(face.positions, face.faces)
+    laid = lay_surface(
+        template,
+        dna.name or "the face",
+        target,
+        standing.found,
+        threads,
+        telling(progress, _STOOD, _LAID),
+    )
     turn, _ = rigid_fit(template.points, laid.points)
     back = turn_back(turn)
-    sure = laid.trusted if laid.trusted.any() else np.ones(len(before), bool)
+    sure = laid.trust > 0 if (laid.trust > 0).any() else np.ones(len(before), bool)
     shift = template.points[sure].mean(axis=0) - (laid.points[sure] @ back.T).mean(axis=0)
 
     def there(places: Doubles) -> Doubles:
         return np.asarray((places @ back.T + shift) @ axes.T / size)
 
-    return there(laid.points), [Ball(there(b.middle[None])[0], b.radius / size) for b in balls]
-
-
-def _face_of(standing: Standing) -> tuple[Surface, list[Ball]]:
-    """The skin that the face of a head is on, without eyes, and the eyeballs."""
-    marks = standing.found.landmarks.points
-    middles = {side: (marks[f"eye_inner_{side}"] + marks[f"eye_outer_{side}"]) / 2 for side in "LR"}
-    shift = np.array([(middles["L"] + middles["R"])[0] / 2, 0.0, 0.0])
-    centred = [_shifted(part, -shift) for part in standing.parts]
-    height = (TOP - CHIN) * standing.found.pose.scale
-    rest, eyes = take_eyes(centred, height, {s: m - shift for s, m in middles.items()})
-    able = [part for part in rest if kind_of(part.name) == "skin" and part.mesh.faces] or rest
-    places = np.array(list(marks.values())) - shift
-
-    def away(part: HeadPart) -> float:
-        points = part.mesh.positions
-        return float(np.mean([np.square(points - p).sum(axis=1).min() for p in places]))
-
-    mesh = min(able, key=away).mesh
-    surface = Surface.of_polygons(mesh.positions + shift, mesh.faces)
-    return surface, [Ball(eye.ball.middle + shift, eye.ball.radius) for eye in eyes]
-
-
-def _shifted(part: HeadPart, shift: Doubles) -> HeadPart:
-    mesh = replace(part.mesh, positions=part.mesh.positions + shift)
-    return replace(part, mesh=mesh, shapes={})
+    balls = [Ball(there(eye.middle[None])[0], eye.radius / size) for eye in parts.eyes.values()]
+    return there(laid.points), balls
 
 
 def _outward(surface: Surface) -> Surface:
-    """The same with triangles that face outward; a mirrored file has them the other way."""
+    """The surface with triangles that face outward. Left-handed files have them inverted."""
     middle = surface.points.mean(axis=0)
     corners = surface.points[surface.triangles[:, 0]] - middle
     if float((corners * surface.face_normals()).sum()) >= 0:
@@ -205,18 +171,20 @@ def _outward(surface: Surface) -> Surface:
 
 
 def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:
-    """Whether a mesh is a sculpt of a face's skin: its vertices and polygons.
+    """Whether a mesh has the vertex count and the polygons of a face's skin.
 
     Args:
         dna: the face.
-        mesh: in question.
+        mesh: the mesh.
     """
     skin = skin_of(dna)
     return skin >= 0 and has_polygons_of(dna.meshes[skin], mesh)
 
 
 def standing_axes(dna: Dna) -> Doubles:
-    """float64[3, 3]: rows are the file's axes in x left, y up, z front; points @ it stand.
+    """float64[3, 3]: the axes of a file in the standing space (x left, y up, z front), as rows.
+
+    Standing positions are `points @ standing_axes(dna)`.
 
     Args:
         dna: the face.
@@ -225,5 +193,9 @@ def standing_axes(dna: Dna) -> Doubles:
 
 
 def mm_of(dna: Dna) -> float:
-    """Millimetres of a unit of the file."""
+    """Millimetres per unit of a file.
+
+    Args:
+        dna: the file.
+    """
     return UNITS.get(dna.translation_unit, UNITS["cm"])

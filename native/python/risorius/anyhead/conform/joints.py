@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where joints lie on the other head, and how far controls shift them there.
+"""Neutral joint positions on the target head, and joint translations of the joint groups.
 
-Joints keep their directions, so what turns them means the same; a head that is turned as a whole
-turns its roots. What shifts them changes as the skin that they carry.
+Joints keep their orientation, so that rotation columns keep their meaning. If the whole head is
+rotated, the root joints take the rotation. Translation columns are transformed by the deformation
+gradient of the skin that the joint carries.
 """
 
 from __future__ import annotations
@@ -19,34 +20,37 @@ from ...rigs.rotation import Convention
 from .change import Change
 from .parts import Stiff, finest, kind
 
-_HELD = 1e-6  # the weight of all vertices from which on a joint has a place by them
-_SOME = 0.05  # of the meshes in the mouth: what a jaw carries at least, and leaves to the head
+_HELD = 1e-6  # sum of skin weights: a joint with less counts as a joint without vertices
+_SOME = (
+    0.05  # of the weights in the mouth: a jaw carries more than this share and less than the rest
+)
 Carried = Mapping[int, tuple[Doubles, Doubles, Doubles]]  # mesh -> before, after, linear
 
 
 class Places:
-    """Of all joints.
+    """Positions of all joints.
 
     Attributes:
-        before, after: float64[J, 3], where they are in the world.
-        linear: float64[J, 3, 3], the change of form about each.
+        before, after: float64[J, 3], world positions on the source and the target head.
+        turns: float64[J, 3, 3], world rotations on the source head.
+        linear: float64[J, 3, 3], the mean deformation gradient of the skin of each joint.
     """
 
     def __init__(self, dna: Dna, carried: Carried, change: Change, stiff: Stiff) -> None:
-        """Finds them.
+        """Compute the positions.
 
         Args:
-            dna: the face.
-            carried: vertices of meshes of the finest level.
-            change: of its skin.
-            stiff: parts of the face.
+            dna: the source face.
+            carried: vertices and gradients of the meshes of LOD 0, by mesh index.
+            change: the deformation of the skin.
+            stiff: the rigid parts of the face.
         """
         count = len(dna.joint_names)
         frames = sk.world_matrices(dna, np.zeros((count, 9)))
         self.turns, self.before = frames[:, :3, :3], frames[:, :3, 3]
         sums = _means(dna, carried)
         none = np.flatnonzero(np.isnan(sums[:, 0]))
-        for joint in none.tolist():  # nothing hangs on any of its line
+        for joint in none.tolist():  # no joint above or below has vertices
             way = change.around(self.before[joint], change.reach)
             sums[joint] = np.concatenate([way.middle, way.becomes, way.linear.ravel()])
         self.linear = sums[:, 6:].reshape(-1, 3, 3)
@@ -57,14 +61,16 @@ class Places:
             self.after[own] = eye.way(self.before[own])
         inside = [m for m in carried if kind(dna.mesh_names[m]) == "mouth"]
         jaw = jaw_of(dna, inside)
-        if stiff.mouth is not None and jaw >= 0:  # a jaw is one piece with its teeth
+        if stiff.mouth is not None and jaw >= 0:  # the jaw bone is rigid with its teeth
             self.after[jaw] = stiff.mouth(self.before[jaw])
 
 
 def _means(dna: Dna, carried: Carried) -> Doubles:
-    """float64[J, 15]: means over what each joint carries, of before, after and the change.
+    """float64[J, 15]: weighted means over the vertices of each joint: source position, target
+    position, deformation gradient.
 
-    A joint that carries nothing is as those below it, or as the one above; NaN: none carries any.
+    A joint without vertices takes the mean of its children, else the values of its parent. NaN if
+    no joint of its branch has vertices.
     """
     count = len(dna.joint_names)
     sums, held = np.zeros((count, 15)), np.zeros(count)
@@ -95,12 +101,12 @@ def _means(dna: Dna, carried: Carried) -> Doubles:
 
 
 def place_joints(out: Dna, places: Places, turn: Doubles) -> None:
-    """Writes the neutral pose.
+    """Write the neutral joint translations, and the rotations of the roots if the head is rotated.
 
     Args:
-        out: gets it; has the tree and the old one.
-        places: of its joints.
-        turn: float64[3, 3] of the whole head.
+        out: a copy of the source face, changed in place.
+        places: the joint positions.
+        turn: float64[3, 3], the rotation of the whole head.
     """
     parents = np.asarray(out.joint_parents, np.int64)
     roots = parents == np.arange(len(parents))
@@ -115,13 +121,14 @@ def place_joints(out: Dna, places: Places, turn: Doubles) -> None:
 
 
 def jaw_of(dna: Dna, mouth: Sequence[int]) -> int:
-    """The joint that the lower teeth hang on; -1: there is none.
+    """The index of the jaw joint, -1 if there is none.
 
-    It turns, carries some of the meshes in the mouth and not all of them.
+    The jaw is the joint with a rotation column that carries a part of the meshes in the mouth (the
+    lower teeth) and not all of them.
 
     Args:
-        dna: the face.
-        mouth: the meshes in the mouth.
+        dna: the source face.
+        mouth: indices of the meshes in the mouth.
     """
     count = len(dna.joint_names)
     held = np.zeros(count)
@@ -141,12 +148,12 @@ def jaw_of(dna: Dna, mouth: Sequence[int]) -> int:
 
 
 def shifts_carried(dna: Dna, places: Places, turn: Doubles) -> list[JointGroup]:
-    """The joint groups with shifts as they are on the other head.
+    """The joint groups with the translation columns of the target head.
 
     Args:
-        dna: the face before.
-        places: of its joints.
-        turn: float64[3, 3] of the whole head.
+        dna: the source face.
+        places: the joint positions and gradients.
+        turn: float64[3, 3], the rotation of the whole head.
     """
     parents = np.asarray(dna.joint_parents, np.int64)
     roots = parents == np.arange(len(parents))

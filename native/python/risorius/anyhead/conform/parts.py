@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What of a face is stiff: eyes, which are spheres, and the inside of the mouth."""
+"""The rigid parts of a face: the eyeballs and the inside of the mouth."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from .change import Change, Similar, similar
 
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
-_INNER = 0.35  # of an eye's radius: joints as near to its middle are the eye's
-_RIM, _BAND = 1.1, 0.03  # of the radius: where the rims of lids lie, and how far off they may
-_STIFF = 0.9  # of a vertex' weight that an eye's joints have, where it goes with the eye
-_PRIOR = 0.01  # how much the skin around counts beside the distance of the rims
+_INNER = 0.35  # of the radius: joints closer to the centre of an eye move with the eye
+_RIM, _BAND = 1.1, 0.03  # of the radius: distance of the lid rims from the centre, and its width
+_STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more than this weight of it
+_PRIOR = 0.01  # weight of the surrounding skin against the distance of the lid rims
 _ROUNDS = 20
 
 
@@ -33,11 +33,11 @@ class Eye:
     """An eyeball.
 
     Attributes:
-        middle: float64[3], and
-        radius: on the first head.
-        way: where it comes to.
-        joints: at its middle, as those of lids are that slide on it.
-        holds: joints that hold it.
+        middle: float64[3], the centre on the source head.
+        radius: on the source head.
+        way: the similarity transform to the target head.
+        joints: joints at its centre; joints of lids that slide on the eye are among them.
+        holds: joints with most of the skin weights of the eyeball.
     """
 
     middle: Doubles
@@ -48,14 +48,14 @@ class Eye:
 
 
 class Ball(NamedTuple):
-    """An eyeball of the other head, in the face's axes, unit and place."""
+    """An eyeball of the target head, in the axes, the unit and the position of the face."""
 
     middle: Doubles
     radius: float
 
 
 class Stiff(NamedTuple):
-    """The skin's mesh, the eyes, and what the inside of the mouth does."""
+    """The index of the skin mesh, the eyeballs, and the transform of the inside of the mouth."""
 
     skin: int
     eyes: Sequence[Eye]
@@ -63,10 +63,10 @@ class Stiff(NamedTuple):
 
 
 def kind(name: str) -> str:
-    """eyes, mouth, or skin for what lies on the skin.
+    """How a mesh follows: "eyes", "mouth", or "skin" for a mesh that is bound to the skin.
 
     Args:
-        name: of a mesh.
+        name: the name of the mesh.
     """
     found = kind_of(name)
     if found in ("teeth", "tongue", "gum") and not _ON_SKIN.search(name):
@@ -77,7 +77,7 @@ def kind(name: str) -> str:
 
 
 def skin_of(dna: Dna) -> int:
-    """The mesh of the finest level that is the skin; -1: there is none.
+    """The index of the skin mesh of LOD 0, the largest if there are several; -1 if there is none.
 
     Args:
         dna: the face.
@@ -90,18 +90,18 @@ def skin_of(dna: Dna) -> int:
 
 
 def finest(dna: Dna) -> list[int]:
-    """The meshes of LOD 0."""
+    """Indices of the meshes of LOD 0 that have vertices."""
     rows, count = dna.lod_mesh_mapping, min(len(dna.meshes), len(dna.mesh_names))
     listed = rows[0].tolist() if len(rows) else range(count)
     return [m for m in listed if m < count and len(dna.meshes[m].positions)]
 
 
 def mouth_way(dna: Dna, change: Change) -> Similar | None:
-    """What teeth, gums and tongue do together; None: there are none.
+    """The common similarity transform of teeth, gums and tongue; None if the face has none.
 
     Args:
-        dna: the face.
-        change: of its skin.
+        dna: the source face.
+        change: the deformation of its skin.
     """
     own = [
         np.asarray(dna.meshes[m].positions, np.float64)
@@ -122,15 +122,14 @@ def eyes_of(
     world: Doubles,
     balls: Sequence[Ball] = (),
 ) -> list[Eye]:
-    """The eyeballs of a face.
+    """The eyeballs of a face with their transforms to the target head.
 
     Args:
-        dna: the face.
-        change: of its skin.
-        moved: float64[V, 3] by mesh, where vertices lie on the other head; an eye that is there
-            goes there.
-        world: float64[J, 3], where the joints are.
-        balls: eyes of the other head.
+        dna: the source face.
+        change: the deformation of its skin.
+        moved: float64[V, 3] by mesh name, given vertex positions on the target head.
+        world: float64[J, 3], world positions of the joints of the source face.
+        balls: eyeballs of the target head.
     """
     out: list[Eye] = []
     for m in finest(dna):
@@ -145,7 +144,7 @@ def eyes_of(
             radius = float(np.median(far)) if ball is None else ball.radius
             own = [e for e in out if np.linalg.norm(e.middle - middle) < max(e.radius, radius)]
             if own:
-                continue  # its cornea, or what lies behind it
+                continue  # the cornea or another layer of the same eye
             joints = np.flatnonzero(np.linalg.norm(world - middle, axis=1) < _INNER * radius)
             if name in moved:
                 way = similar(points[vertices], moved[name][vertices], change)
@@ -157,11 +156,11 @@ def eyes_of(
 
 
 def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
-    """bool[V]: whether vertices go with an eye, as its joints hold them.
+    """bool[V]: True for vertices whose skin weights belong to the joints of an eye.
 
     Args:
-        mesh: has the weights.
-        joints: of the eye.
+        mesh: gives the skin weights.
+        joints: the joints of the eye.
     """
     vertex, joint, weight = sk.skin_entries(mesh)
     own = weight * np.isin(joint, list(joints))
@@ -170,7 +169,7 @@ def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
 
 
 def _holding(mesh: Mesh, vertices: Ints, joints: int) -> frozenset[int]:
-    """The joints that hold most of some vertices."""
+    """Joints with more than half of the skin weights of the vertices."""
     vertex, joint, weight = sk.skin_entries(mesh)
     own = np.isin(vertex, vertices)
     held = np.bincount(joint[own], weights=weight[own], minlength=joints)
@@ -178,14 +177,14 @@ def _holding(mesh: Mesh, vertices: Ints, joints: int) -> frozenset[int]:
 
 
 def _balls(mesh: Mesh, points: Doubles) -> list[Ints]:
-    """The pieces of a mesh that lie at places of their own, largest first."""
+    """Vertex indices of each connected piece of a mesh, the largest piece first."""
     label = pieces_of(mesh)
     pieces = [np.flatnonzero(label == k) for k in range(int(label.max()) + 1)]
     return sorted(pieces, key=lambda own: -float(np.ptp(points[own], axis=0).max()))
 
 
 def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
-    """An eyeball where the other head has one, near the place that its lids say."""
+    """The transform to the eyeball of the target head that is near the estimated centre."""
     near = [b for b in balls if np.linalg.norm(b.middle - way.becomes) < way.size * radius]
     if not near:
         return way
@@ -195,10 +194,10 @@ def _in_ball(way: Similar, radius: float, balls: Sequence[Ball]) -> Similar:
 
 
 def _in_lids(change: Change, middle: Doubles, radius: float) -> Similar:
-    """An eyeball whose distance from the rims of the lids grows as it does.
+    """The transform that keeps the distance between the eyeball and the lid rims in proportion.
 
-    Rims are a narrow band of a sphere: they say well where the eye is, and together with what the
-    skin around does how large it is.
+    The rims are a narrow band of a sphere and determine its centre well. Its radius needs the
+    transform of the surrounding skin as a prior.
     """
     start = change.around(middle, radius)
     away = change.before.points - middle

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A sculpt of a face's own topology: which meshes it has, and in which axes and unit."""
+"""Sculpts with the topology of a face: matching of meshes, axes and unit."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from ...author.heads.sizes import UNITS
 from ...author.input.obj import ObjMesh
 from .parts import finest, skin_of
 
-_AS_IT_IS = 2.0  # times larger or smaller: a form, and no other unit
-_LEANS = np.cos(np.radians(30.0))  # of the angle by which a head may lean in its file
-_FIVE = 5  # polygons of more corners are seldom, and cut in many ways
+_AS_IT_IS = 2.0  # a head up to twice as large or small has the unit of the face
+_LEANS = np.cos(np.radians(30.0))  # largest angle between a head and the axes of its file
+_FIVE = 5  # triangulations of polygons with more corners are not compared
 
 
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
-    """float64[V, 3] of each mesh of the finest level that a head has with the same polygons.
+    """float64[V, 3] by mesh name: vertex positions of the LOD 0 meshes that a head has.
 
-    Polygons may be cut into triangles. Of several meshes with the same polygons, as both eyes are,
-    the one of the nearest name is meant, then the first.
+    A mesh matches if it has the same polygons, also triangulated. If several meshes match, such as
+    both eyes, the most similar name is taken, then the first.
 
     Args:
         dna: the face.
@@ -44,11 +44,11 @@ def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
 
 
 def has_polygons_of(mesh: Mesh, other: ObjMesh) -> bool:
-    """Whether a mesh has the vertices and polygons of a mesh of a face.
+    """Whether a mesh has the vertex count and the polygons of a mesh of a face.
 
     Args:
-        mesh: of the face.
-        other: the mesh in question.
+        mesh: the mesh of the face.
+        other: the other mesh; its polygons may be triangulated.
     """
     if len(other.positions) != len(mesh.positions) or not other.faces:
         return False
@@ -68,15 +68,16 @@ def has_polygons_of(mesh: Mesh, other: ObjMesh) -> bool:
 def into_own_space(
     dna: Dna, moved: dict[str, Doubles], factor: float | None = None
 ) -> tuple[dict[str, Doubles], str]:
-    """The vertices of a sculpt in the face's axes and unit, and a sentence where they had others.
+    """Convert a sculpt to the axes and the unit of a face.
 
-    A sculpt that lies as the face does stays where it is. Otherwise it is turned by right angles
-    and multiplied by the ratio of two units.
+    A sculpt in the axes and the unit of the face is returned unchanged. Another one is rotated by
+    right angles and scaled by the ratio of two units. The second value is a sentence about the
+    conversion, "" for none.
 
     Args:
         dna: the face.
-        moved: float64[V, 3] by mesh, of a head; with the skin.
-        factor: what all numbers are multiplied with; None: it is found.
+        moved: float64[V, 3] by mesh name; the skin is required.
+        factor: the scale; None: guessed.
     """
     skin = skin_of(dna)
     before = np.asarray(dna.meshes[skin].positions, np.float64)
@@ -90,14 +91,14 @@ def into_own_space(
     if factor == 1.0 and np.array_equal(own, np.eye(3)):
         return moved, ""
     there = {name: factor * points @ own.T for name, points in moved.items()}
-    return there, f"the head is turned into the face's axes and multiplied by {factor:g}"
+    return there, f"the head is rotated to the axes of the face and multiplied by {factor:g}"
 
 
 def turn_back(turn: Doubles) -> Doubles:
-    """float64[3, 3]: what turns a head back, by right angles where it then leans a little at most.
+    """float64[3, 3]: the rotation from a head to a face, a multiple of right angles if possible.
 
     Args:
-        turn: float64[3, 3], from the face to the head.
+        turn: float64[3, 3], the rotation from the face to the head.
     """
     best = max(right_angles(), key=lambda own: float(np.trace(own @ turn)))
     leans = (np.trace(best @ turn) - 1) / 2
@@ -105,7 +106,7 @@ def turn_back(turn: Doubles) -> Doubles:
 
 
 def right_angles() -> list[Doubles]:
-    """The 24 rotations that bring axes to axes, none first."""
+    """The 24 rotations by right angles, the identity first."""
     out = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -116,16 +117,16 @@ def right_angles() -> list[Doubles]:
 
 
 def unit_back(size: float) -> float:
-    """The ratio of two units that makes a head about as large as the face.
+    """The ratio of two units that scales a head to about the size of the face.
 
     Args:
-        size: how large the head is beside the face, above 0.
+        size: the size of the head divided by the size of the face, above 0.
     """
     ratios = {one / other for one in UNITS.values() for other in UNITS.values()}
     return min(sorted(ratios), key=lambda ratio: abs(np.log(ratio * max(size, 1e-12))))
 
 
 def _same_start(one: str, other: str) -> int:
-    """How many characters two names have in common from their beginning."""
+    """The length of the common prefix of two names."""
     pairs = zip(one.lower(), other.lower(), strict=False)
     return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))

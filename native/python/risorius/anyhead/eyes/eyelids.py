@@ -22,13 +22,15 @@ _FADE = 16.0  # mm from the edge: what goes none of it
 _CORNER = 4.0  # mm beyond a corner: what goes none of it
 _CLEAR = 0.3  # mm above the eye at rest: what is outside of it, no rim that touches
 _SKIN = 0.5  # mm above the eye, least of what was further from it
-_PRESSED = 0.1  # mm that edges overlap which are brought together
+_PRESSED = 0.15  # mm that edges overlap which are brought together
 _OVER = 0.4  # mm that an edge goes further than its own column asks for
 _BESIDE = 0.5  # mm beyond the edges, where the eye is seen between lids still
 _THROUGH = 0.8  # mm that the edges of closed lids may overlap
 _LOWER = 0.15  # of the gap: what the lower lid takes
+_VIEW = 80  # rays each way of who looks at closed lids
+_VIEWS = ((0.0, 0.0), (-25.0, 0.0), (25.0, 0.0), (0.0, 20.0), (0.0, -20.0))  # degrees
 _ROUNDS = 8
-_ENOUGH = 0.1  # mm of an eye that is seen between closed lids
+_ENOUGH = 0.04  # mm of an eye that is seen between closed lids
 _SOFT = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])  # shares of columns
 _HELD = 1.5  # of the radius: what is further from the eye's middle goes less far
 _LOOKS = 64  # directions each way that are looked along
@@ -117,6 +119,23 @@ class Eyelids:
         own &= self._held > 0
         return self.vertices[own], self._height[own]
 
+    def apart(self, points: Doubles) -> float:
+        """How far upper and lower edge are from each other in the mean, a share of their width.
+
+        Args:
+            points: float64[V, 3], of the whole target, or of what has its vertices.
+        """
+        across = self.opening.frame.angles(self.rest)[0]
+        edge = (self._from_edge < _BAND / 3) & (self._held > 0)
+        upper, lower = np.flatnonzero(edge & self._above), np.flatnonzero(edge & ~self._above)
+        if not len(upper) or not len(lower):
+            return 0.0
+        facing = lower[np.abs(across[upper, None] - across[lower]).argmin(axis=1)]
+        off = points[self.vertices[upper]] - points[self.vertices[facing]]
+        ends = upper[[across[upper].argmin(), across[upper].argmax()]]
+        wide = np.linalg.norm(np.diff(points[self.vertices[ends]], axis=0))
+        return float(np.linalg.norm(off, axis=1).mean() / max(float(wide), 1e-12))
+
     def moves(self, displacement: Doubles) -> bool:
         """Whether an expression moves these lids.
 
@@ -177,8 +196,47 @@ class Eyelids:
             if number and wrong < _ENOUGH * self.mm:
                 break
         out = displacement.copy()
-        out[self.vertices] = best - self.rest
+        out[self.vertices] = self._level(best, turn) - self.rest
         return out
+
+    def _level(self, points: Doubles, turn: Doubles | None) -> Doubles:
+        """Closed lids whose edges are equally far from the eye: who looks from aside or from above
+        sees no step that opens."""
+        seen = self._viewed(points)
+        if not seen:
+            return points
+        high, low = (self._edge_line(points, turn, upper=upper)[1] for upper in (True, False))
+        step = low - high
+        known = ~np.isnan(step)
+        if not known.any():
+            return points
+        columns = np.arange(len(step))
+        step = _even(np.interp(columns, columns[known], step[known]))
+        across, up, away = self.opening.frame.angles(points)
+        fade = self._fade(0.0) * np.interp(across, self.opening.across, step)
+        away = away + np.where(self._above, (1 - _LOWER) * fade, -_LOWER * fade)
+        rays = self.opening.frame.rays(across, up)
+        leveled = self._lifted(self.opening.frame.middle + away[:, None] * rays, turn)
+        closed = self._gap(leveled, turn) <= _ENOUGH * self.mm
+        return leveled if closed and self._viewed(leveled) < seen else points
+
+    def _viewed(self, points: Doubles) -> int:
+        """How much of the resting ball is seen by those who look from in front, from aside and
+        from above: rays that all go the same way."""
+        frame, radius, tree, seen = self.opening.frame, self.ball.radius, self._posed(points), 0
+        at = radius * np.linspace(-1, 1, _VIEW)
+        x, y = (grid.ravel()[:, None] for grid in np.meshgrid(at, at))
+        on = ((x**2 + y**2) < (0.95 * radius) ** 2).ravel()
+        for aside, above in _VIEWS:
+            way = frame.rays(np.radians(aside), np.radians(above))
+            side = np.cross(frame.up, way)
+            side /= np.linalg.norm(side)
+            begin = (frame.middle + x * side + y * np.cross(way, side) + 3 * radius * way)[on]
+            rays = np.broadcast_to(-way, begin.shape)
+            lid, _, distance = tree.first_hit(begin, rays)
+            away = np.sqrt(radius**2 - (x**2 + y**2)[on, 0])  # of the ball's front from its middle
+            seen += int(((lid < 0) | (distance > 3 * radius - away)).sum())
+        return seen
 
     def lifted(self, displacement: Doubles, turn: Doubles | None = None) -> Doubles:
         """float64[V, 3]: an expression whose lids are not in the eye.
@@ -249,15 +307,20 @@ class Eyelids:
         return np.asarray(-turned * whole + np.interp(across, columns, rest) * fade)
 
     def _edge(self, points: Doubles, turn: Doubles | None, *, upper: bool = True) -> Doubles:
+        return self._edge_line(points, turn, upper=upper)[0]
+
+    def _edge_line(
+        self, points: Doubles, turn: Doubles | None, *, upper: bool
+    ) -> tuple[Doubles, Doubles]:
         """float64[columns]: the lowest place of the upper lid or the highest of the lower one,
-        where the lid is over the eye; NaN where it has none."""
+        where the lid is over the eye, and how far it is from the middle; NaN where it has none."""
         across, up, away = self.opening.frame.angles(points)
         own = self._above == upper
         a, b = self._edges[own[self._edges].all(axis=1)].T
         near = (self._from_edge[a] < 2 * _BAND) | (self._from_edge[b] < 2 * _BAND)
         a, b = a[near], b[near]
         columns = self.opening.across
-        out = np.full(len(columns), np.nan)
+        out, far = np.full((2, len(columns)), np.nan)
         clear = away - self.ball.reach(self.opening.frame.rays(across, up), turn)
         for k, column in enumerate(columns):
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -267,8 +330,10 @@ class Eyelids:
             over = (1 - s) * clear[a[on]] + s * clear[b[on]] > -0.02 * self.mm
             places = ((1 - s) * up[a[on]] + s * up[b[on]])[over]
             if len(places):
-                out[k] = places.min() if upper else places.max()
-        return out
+                at = int(places.argmin() if upper else places.argmax())
+                out[k] = places[at]
+                far[k] = ((1 - s) * away[a[on]] + s * away[b[on]])[over][at]
+        return out, far
 
     def _lacks(self, points: Doubles, turn: Doubles | None, above: float) -> Doubles:
         """float64[n]: how far the eye comes through the skin that is clear of it at rest, or lies

@@ -102,8 +102,14 @@ def near_eye(surface: Surface, ball: Eyeball) -> Surface:
         surface: of the skin.
         ball: the eye.
     """
-    near = np.linalg.norm(surface.points - ball.middle, axis=1) < FAR * ball.radius
-    return Surface(surface.points, surface.triangles[near[surface.triangles].any(axis=1)])
+    corners = surface.points[surface.triangles]  # a large triangle has none of its corners near
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    off = ball.middle - np.clip(ball.middle, low, high)
+    return Surface(surface.points, surface.triangles[(off**2).sum(axis=1) < _far(ball) ** 2])
+
+
+def _far(ball: Eyeball) -> float:
+    return FAR * ball.radius
 
 
 def find_opening(lids: Surface, ball: Eyeball) -> Opening | None:

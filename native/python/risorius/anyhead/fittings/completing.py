@@ -30,6 +30,7 @@ Mask = npt.NDArray[np.bool_]
 _RIM = 1.5  # mm from the edge of a lid: what lies on the eye
 _PATCH = 40  # vertices of the skin that lashes are laid on by
 _SEEN = 0.3  # of the template's opening: where less is seen the eye is painted or closed
+_OPENED = 0.45  # of how far the template's lids are apart: where they are nearer, they are closed
 _AROUND = 2.5  # cm around the teeth: the skin that says where they belong
 _STEP, _STEPS = 0.05, 16  # cm that teeth go back by where they come through the skin
 _THROUGH = 0.02  # cm that they may
@@ -82,10 +83,12 @@ class _Completing:
         if ball is None or lids is None:
             return False
         way = self._seat(ball, lids)
+        opened = lids.apart(self.laid) / max(lids.apart(self.skin.points), 1e-12)
         new = Eyeball(side, way.point(ball.middle), way.scale * ball.radius,
                       way.point(ball.points), ball.triangles)  # fmt: skip
         opening = find_opening(near_eye(self.target, new), new)
-        if opening is None or _size(opening) < _SEEN * _size(lids.opening):
+        seen = opening is not None and _size(opening) > _SEEN * _size(lids.opening)
+        if not seen or opened < _OPENED:
             self.out.notes.append(f"the {_SIDES[side]} eye is painted on the skin, or closed: no "
                                   "eyeball is fitted in")  # fmt: skip
             return False

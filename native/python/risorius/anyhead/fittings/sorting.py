@@ -50,6 +50,7 @@ _NEAR = 2.6  # of an eye's radius: where its lids are
 _AT_EYE = 2.4  # of an eye's radius: how far lashes reach
 _LASH = 0.25  # of the face's height: nothing at an eye is larger
 _MOUTH_HALF, _MOUTH_HIGH = 3.6, 4.0  # cm about the middle, of what may be teeth or a tongue
+_APART = 0.3  # cm between the middles of both rows of teeth, at least
 _LARGE = 9.0  # cm: hair at least
 
 
@@ -278,43 +279,59 @@ def _called(piece: HeadPart, kind: str) -> str:
 def _divide_mouth(out: Fittings, place: _Place) -> None:
     """Upper teeth on the head, lower teeth and tongue on the jaw."""
     rows: list[Fitted] = []
+    middle = _between_rows(out, place)
     for row in out.rows:
         if row.kind == TONGUE:
             row.hangs = JAW
             row.part.name = _with(row.part.name, "tongue")
-        if row.kind not in (TEETH, GUMS):
+        if row.kind in (TEETH, GUMS):
+            rows.extend(_rows_of_teeth(row, middle, out.notes))
+        else:
             rows.append(row)
-            continue
-        rows.extend(_rows_of_teeth(row, place, out.notes))
     out.rows = rows
 
 
-def _rows_of_teeth(row: Fitted, place: _Place, notes: list[str]) -> list[Fitted]:
+def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
+    """The island of each vertex, and the height of the middle of each island."""
+    labels: Ints = islands_of(part.mesh)
+    heights, count = part.mesh.positions[:, 1], int(labels.max()) + 1
+    low, high = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(low, labels, heights)
+    np.maximum.at(high, labels, heights)
+    return labels, (low + high) / 2
+
+
+def _between_rows(out: Fittings, place: _Place) -> float:
+    """The height between upper and lower teeth."""
+    middles = [_heights(row.part)[1] for row in out.of(TEETH)]
+    every = np.concatenate(middles) if middles else np.zeros(0)
+    apart = float(np.ptp(every)) if len(every) > 1 else 0.0
+    return (
+        float(every.min() + every.max()) / 2
+        if apart > _APART * place.unit
+        else (place.mouth_height)
+    )
+
+
+def _rows_of_teeth(row: Fitted, middle: float, notes: list[str]) -> list[Fitted]:
     name = row.part.name
     word = "gums" if row.kind == GUMS else "teeth"
     if _LOWER.search(name) and not _UPPER.search(name):
         return [Fitted(row.kind, row.part, "", JAW)]
     if _UPPER.search(name):
         return [Fitted(row.kind, row.part, "", HEAD)]
-    labels: Ints = islands_of(row.part.mesh)
-    heights = row.part.mesh.positions[:, 1]
-    count = int(labels.max()) + 1
-    centers = np.array(
-        [(heights[labels == i].min() + heights[labels == i].max()) / 2 for i in range(count)]
-    )
-    if count == 1:
-        lower = bool(centers[0] < place.mouth_height) and "tongue" not in name
-        notes.append(f"{name} is one piece: it hangs on the {'jaw' if lower else 'head'}")
-        return [Fitted(row.kind, row.part, "", JAW if lower else HEAD)]
-    low = centers < (centers.min() + centers.max()) / 2
-    pieces = taken_apart(
-        row.part,
-        [f"{word}Upper", f"{word}Lower"],
-        low[labels[first_vertices(row.part)]].astype(np.int64),
-    )
+    labels, middles = _heights(row.part)
+    low = middles < middle
+    if low.all() or not low.any():
+        hangs = JAW if low.all() else HEAD
+        if len(low) == 1:
+            notes.append(f"{name} is one piece: it hangs on the {hangs}")
+        row.part.name = f"{word}{'Lower' if hangs == JAW else 'Upper'}"
+        return [Fitted(row.kind, row.part, "", hangs)]
+    names = [f"{word}Upper", f"{word}Lower"]
+    pieces = taken_apart(row.part, names, low[labels[first_vertices(row.part)]].astype(np.int64))
     return [
-        Fitted(row.kind, piece, "", JAW if piece.name == f"{word}Lower" else HEAD)
-        for piece in pieces
+        Fitted(row.kind, piece, "", JAW if piece.name == names[1] else HEAD) for piece in pieces
     ]
 
 

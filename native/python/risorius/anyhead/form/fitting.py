@@ -21,6 +21,8 @@ from .heads import HeadForm, head_form
 _NOISE = 0.1  # cm of the model, of what parts explain
 _ALIKE = 0.08  # neighbours err alike: what share of the pairs counts as a measurement of its own
 _ALONG = 0.15  # how much a pair says of places along the surface, where that across it says 1
+_EXPRESSED = 4.0  # an expression of 0.5 is as seldom as a part of 1
+_SELDOM = ("smile", "pucker")  # of a neutral face: they would take the place of its own mouth
 _OPEN = (0.0, 1.2)  # what an expression may be
 _BEYOND = 3.5  # standard deviations that a part may have
 
@@ -302,7 +304,10 @@ class _System:
         """The pose after the step."""
         values = np.concatenate([pose.parts[: self.parts], pose.expressions[: self.more]])
         hold = np.full(len(values), float(self.step.prior))
-        hold[self.parts :] *= 4.0  # an expression of 0.5 is as seldom as a part of 1
+        hold[self.parts :] *= _EXPRESSED
+        for k, name in enumerate(self.form.expression_names[: self.more]):
+            if name in _SELDOM:
+                hold[self.parts + k] *= 20.0
         at = np.arange(7, 7 + len(values))
         self.left[at, at] += hold
         self.right[at] -= hold * values

@@ -16,7 +16,7 @@ _FLAT = 0.02  # of a mesh' size: so near to a plane its border lies in it
 _CUT = 0.3  # of the border: where so much of it lies in a plane the mesh was cut there
 _DEEP = 0.12  # cm of the form: a step so deep between the lids is an opening
 _ROWS, _COLUMNS = 25, 5  # rays through an eye
-_CROSSED = 0.04  # of the edges of a face that go through it, where it intersects itself
+_CROSSED = 0.06  # of the edges of a face that go through it, where it intersects itself
 
 
 def check_mesh(where: str, surface: Surface) -> None:
@@ -169,6 +169,25 @@ def lips_apart(target: Target, pose: Pose, points: dict[str, Doubles]) -> bool:
     for place in (upper, lower):
         ends.append(label[own[((inside[own] - place) ** 2).sum(axis=1).argmin()]])
     return bool(ends[0] != ends[1])
+
+
+def check_crossings(where: str, target: Target, pose: Pose) -> None:
+    """Ends where a face goes through itself in many places.
+
+    Args:
+        where: what the error calls the head.
+        target: the surface.
+        pose: of the form in it.
+
+    Raises:
+        LandmarkError: more than a few of its edges do; some do in the nostrils of any head.
+    """
+    share = crossed(target, pose)
+    if share > _CROSSED:
+        raise LandmarkError(
+            f"{where}: the face intersects itself at {100 * share:.0f} % of its edges: make the "
+            "mesh anew (in Blender: the modifier Remesh)"
+        )
 
 
 def crossed(target: Target, pose: Pose) -> float:

@@ -13,7 +13,7 @@ from ..form.fitting import FINE, Held, Pose, Target, fit, form_normals
 from ..form.heads import head_form
 from ..form.standing import NO_FACE, Standing, find_standing
 from ..surface import Surface
-from .checks import LEAST, check_eyes, check_mesh, completed, lips_apart, pieces
+from .checks import LEAST, check_crossings, check_eyes, check_mesh, completed, lips_apart, pieces
 from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
 
@@ -31,16 +31,16 @@ class Hints:
     Attributes:
         where: what errors call the head.
         marks: float64[3] by name of landmarks that a person gave.
-        eyes: middles (float64[3]) of eyeballs that are meshes of their own.
         up, front: float64[3], where the head has them; None: anywhere.
+        eyes: middles (float64[3]) of eyeballs that are meshes of their own.
         open_eyes: whether eyes without openings are refused.
     """
 
     where: str = "the head"
     marks: Mapping[str, Doubles] = field(default_factory=dict)
-    eyes: Sequence[Doubles] = ()
     up: Doubles | None = None
     front: Doubles | None = None
+    eyes: Sequence[Doubles] = ()
     open_eyes: bool = True
 
 
@@ -107,6 +107,7 @@ def find_form(target: Surface, hints: Hints | None = None) -> Found:
         pose = fit(seen, pose, FINE[1:], held)
     points = refined(seen, pose)
     landmarks = _on_surface(seen, pose, points)
+    check_crossings(hints.where, seen, pose)
     if hints.open_eyes:
         check_eyes(hints.where, seen, pose, points)
     for name, point in hints.marks.items():

@@ -24,8 +24,18 @@ def landmark_words() -> Mapping[str, str]:
 @cache
 def needed_landmarks() -> frozenset[str]:
     """Names of those without which a registration cannot begin."""
-    needed = {name for name, row in _table().items() if row.get("needed")}
-    return frozenset(needed | {other_side(name) for name in needed})
+    return _those_with("needed")
+
+
+@cache
+def vague_landmarks() -> frozenset[str]:
+    """Names of those that slide along the skin: nothing is pulled to them."""
+    return _those_with("vague")
+
+
+def _those_with(key: str) -> frozenset[str]:
+    names = {name for name, row in _table().items() if row.get(key)}
+    return frozenset(names | {other_side(name) for name in names})
 
 
 def other_side(name: str) -> str:

@@ -24,6 +24,7 @@ class Region:
         width: cm of the form: how far off its middle half of the weight is gone, nearly.
         prior: how strongly the form's parts are held.
         least_cosine: between the normals of a pair.
+        expressions: whether these may change: at the mouth they would hide who it belongs to.
     """
 
     begins: tuple[str, ...]
@@ -31,11 +32,12 @@ class Region:
     width: float
     prior: float
     least_cosine: float
+    expressions: bool = True
 
 
 REGIONS = (
     Region(("eye_", "lid_"), True, 2.5, 0.5, 0.5),
-    Region(("mouth_", "lip_"), False, 5.0, 0.7, 0.6),
+    Region(("mouth_", "lip_"), False, 5.0, 0.4, 0.6, expressions=False),
     Region(("nose_", "nostril_"), False, 3.5, 0.7, 0.5),
     Region(("ear_",), True, 4.5, 0.7, 0.4),
 )
@@ -69,7 +71,8 @@ def _of_region(
     weights[weights < _SEEN] = 0.0
     parts = len(form.parts)
     steps = tuple(
-        Step(6, reach, _ALL, parts, region.prior, region.least_cosine) for reach in (0.4, 0.25)
+        Step(6, reach, _ALL, parts, region.prior, region.least_cosine, region.expressions)
+        for reach in (0.4, 0.25)
     )
     before = pose.points(form)[places]
     points = fit(target, pose, steps, weights=weights).points(form)

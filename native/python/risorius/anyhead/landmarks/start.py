@@ -9,6 +9,8 @@ from ...author.geometry.skeleton import Doubles
 from ..form.heads import head_form
 from ..surface import Surface
 from .find import Found, find_form
+from .marks import MOVED
+from .names import vague_landmarks
 
 _NEIGHBOURS = 12  # vertices of the form that say where a place goes
 _REACH = 2.5  # cm of the form: how far a landmark takes its surroundings along
@@ -47,6 +49,24 @@ def carried(points: Doubles, one: Found, other: Found) -> Doubles:
     return other.pose.place(moved + _to_landmarks(inside, moved, one, other))
 
 
+def common(one: Found, other: Found) -> list[str]:
+    """Names of the landmarks that both heads have, without vague ones that no person moved.
+
+    Args:
+        one, other: the heads.
+    """
+    moved = [
+        n
+        for n in one.landmarks.points
+        if MOVED in (one.landmarks.how[n], other.landmarks.how.get(n))
+    ]
+    return [
+        n
+        for n in one.landmarks.points
+        if n in other.landmarks.points and (n in moved or n not in vague_landmarks())
+    ]
+
+
 def _between(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
     """float64[n, 3]: ways of points, at places between them.
 
@@ -71,7 +91,7 @@ def _between(places: Doubles, points: Doubles, ways: Doubles) -> Doubles:
 
 def _to_landmarks(inside: Doubles, moved: Doubles, one: Found, other: Found) -> Doubles:
     """float64[n, 3]: what is left from each landmark of the one to that of the other, spread."""
-    names = [n for n in one.landmarks.points if n in other.landmarks.points]
+    names = common(one, other)
     if not names:
         return np.zeros_like(inside)
     form = head_form()
@@ -103,7 +123,7 @@ def pairs_of(template: Surface, one: Found, other: Found) -> list[tuple[int, Dou
         one: what was found in it.
         other: what was found in the other head.
     """
-    names = [n for n in one.landmarks.points if n in other.landmarks.points]
+    names = common(one, other)
     places = np.array([one.landmarks.points[n] for n in names]).reshape(-1, 3)
     vertices = [int(((template.points - place) ** 2).sum(axis=1).argmin()) for place in places]
     goals = carried(template.points[vertices], one, other)

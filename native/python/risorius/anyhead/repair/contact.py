@@ -17,6 +17,7 @@ from .report import MM
 
 _NEAR = 0.8  # cm from teeth: skin that may come into them
 _DEEP = 0.01  # cm: what is less deep is left alone
+_AGAINST = 0.3  # cosine
 _INSIDE = 0.4  # cm: what seems to be deeper in lies behind
 _STRETCH = 2.5  # times its area, as SkinChecker counts it
 LEAST = 0.5  # mm3 that are left alone
@@ -27,7 +28,7 @@ _AROUND = 15.0  # cm: what is further hides nothing
 _WAYS = 3  # of fifteen, along which what is seen is seen
 _SHORT = 0.2  # cm: what hangs on a longer edge is not beside what is seen
 _RIM = 2  # rings of vertices beside what is seen
-_MANY = 60_000  # vertices of a skin from which on the soft way is not tried
+_LARGE = 60_000  # vertices of a skin from which on the soft way is not tried
 Mask = npt.NDArray[np.bool_]
 
 
@@ -91,6 +92,18 @@ class Contacts:
         beyond = np.maximum(depth - self._rest_depth - _DEEP, 0.0)
         return float(beyond @ self._share) * MM**3
 
+    def volume_by_checker(self, displacement: Doubles, controls: tuple[str, ...]) -> float:
+        """mm3 of skin in teeth and gums, beyond rest and beside what skin does to itself, by
+        SkinChecker: slower than volume.
+
+        Args:
+            displacement: float64[V, 3].
+            controls: raw controls that are 1.
+        """
+        points, checker = self.skin.points + displacement, self._made()
+        faults = checker.look(points, self.bodies.posed(controls))
+        return float(checker.sum(faults, self._allowed(points)).volume)
+
     def pushed(self, displacement: Doubles, controls: tuple[str, ...]) -> Doubles:
         """float64[V, 3]: an expression with less skin in teeth and gums, pushed out softly.
 
@@ -99,7 +112,7 @@ class Contacts:
             controls: raw controls that are 1.
         """
         posed = self.bodies.posed(controls)
-        if len(self.skin.points) > _MANY:
+        if len(self.skin.points) > _LARGE:
             return self._lifted(displacement, posed)
         points = self.skin.points + displacement
         moved, _, _ = self._made().repair(points, posed, self._allowed(points), [])
@@ -207,7 +220,9 @@ class Contacts:
             normal = np.einsum("nk,nkd->nd", shares, normals)
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
             arm = points - surface.at(triangle.astype(np.int64), shares)
-            inside = (np.einsum("nd,nd->n", arm, normal) < 0) & (distance < _INSIDE)
+            # Beside the border of open gums is not in them.
+            inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
+            inside &= distance < _INSIDE
             deeper: npt.NDArray[np.bool_] = inside & (distance > deepest)
             deepest[deeper], out[deeper] = distance[deeper], normal[deeper]
         return deepest, out

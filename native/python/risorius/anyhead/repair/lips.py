@@ -31,6 +31,12 @@ _TOUCH = 0.8  # mm: lips that are nearer touch at rest
 _GOAL = 0.05  # mm between lips that are brought together
 _DEEP = 0.1  # mm that lips may press into each other, where they do no more at rest
 _ROUNDS = 12
+_UPPER_MM, _LEAST_SHARE = 2.0, 0.15  # what the upper lip takes of the way, at least this share
+_FAR_MM = 6.0  # between lips that are brought together, at most
+_OVER = 0.3  # mm that a column goes further than it lacks
+_SOFTER = 2.0  # of the way: how far the skin goes along
+_SMOOTH = 24  # rounds at most in which columns become alike
+_AGAINST = 0.3  # cosine
 _NEAR = 3.0  # mm: further in there is no sign
 
 
@@ -40,7 +46,7 @@ class Meeting:
 
     Attributes:
         gap: float64[COLUMNS], in the target's unit, below 0 where they are in each other; NaN
-            where a column has no lips.
+            where no column has lips.
         way: float64[COLUMNS, 3] of length 1, from the lower to the upper lip.
     """
 
@@ -88,7 +94,7 @@ class Lips:
             return
         self.found = True
         self.rest = self.meeting(skin.points)
-        self._fades = [self._fade(rim) for rim in rims]
+        self._rims = rims
 
     def _place(self, ends: Doubles, lips: Doubles) -> None:
         """Columns between two corners of the mouth."""
@@ -101,7 +107,8 @@ class Lips:
         first, last = np.sort(self._around(ends))
         inset = _CORNER * (last - first)
         self._edges = np.linspace(first + inset, last - inset, COLUMNS + 1)
-        self.columns = (self._edges[1:] + self._edges[:-1]) / 2
+        columns = (self._edges[1:] + self._edges[:-1]) / 2
+        self._places = np.array([first, *columns, last])  # nothing goes beyond the corners
 
     def _touching(self) -> Doubles | None:
         """float64[2, 3]: where the lips that touch at rest end; None where they do not touch."""
@@ -135,8 +142,12 @@ class Lips:
             order = np.argsort(-apart)  # the nearest is written last
             order = order[(column[order] >= 0) & (apart[order] < gap[column[order]])]
             gap[column[order]], way[column[order]] = apart[order], sign * toward[order]
-        known = np.isfinite(gap)
-        return Meeting(np.where(known, gap, np.nan), way)
+        known = np.flatnonzero(np.isfinite(gap))
+        if len(known):  # a column between the vertices of a coarse lip
+            every = np.arange(COLUMNS)
+            nearest = known[np.abs(every[:, None] - known).argmin(axis=1)]
+            gap, way = np.interp(every, known, gap[known]), way[nearest]
+        return Meeting(np.where(np.isfinite(gap), gap, np.nan), way)
 
     def welded(self) -> int:
         """In how many of the COLUMNS one polygon belongs to both lips."""
@@ -165,13 +176,29 @@ class Lips:
         least = np.fmin(np.nan_to_num(self.rest.gap), 0.0)
         return float(np.nan_to_num(least - self.meeting(points).gap).max(initial=0.0))
 
-    def closed(self, points: Doubles) -> Doubles:
-        """float64[V, 3]: the posed target with lips that meet.
+    def too_far(self, points: Doubles) -> bool:
+        """Whether lips are so far apart that bringing them together would tear them: a mouth that
+        is open at rest needs expressions that close that first.
 
         Args:
             points: float64[V, 3], of the posed target.
         """
+        return self.widest(points) > _FAR_MM * self.mm
+
+    def closed(self, points: Doubles) -> Doubles:
+        """float64[V, 3]: the posed target with lips that meet; as it is where they are too_far.
+
+        Args:
+            points: float64[V, 3], of the posed target.
+        """
+        if self.too_far(points):
+            return points
         best, least = points, np.inf
+        widest = max(self.widest(points), 0.0) / self.mm
+        upper, lower = (self._fade(rim, widest) for rim in self._rims)
+        # Far apart lips meet where the upper one is: it hangs on the skull, the lower on the jaw.
+        share = float(np.clip(_UPPER_MM / max(widest, 1e-9), _LEAST_SHARE, 0.5))
+        field = (1 - share) * lower - share * upper
         for _ in range(_ROUNDS + 1):
             meeting = self.meeting(points)
             wrong = self._wrong(meeting)
@@ -180,13 +207,13 @@ class Lips:
                 best, least = points, cost
             if not wrong.any():
                 break
-            by = _even(wrong)[:, None] * _straight(meeting.way, wrong)
+            rounds = 2 + min(int(2 * cost / self.mm), _SMOOTH)
+            most = np.maximum(wrong, 0.0) + _OVER * self.mm
+            even = np.minimum(_even(wrong, rounds // 2), most)
+            by = np.pad(even[:, None] * _straight(meeting.way, wrong, rounds), ((1, 1), (0, 0)))
             around = self._around(points)
-            share = np.stack(
-                [np.interp(around, self.columns, by[:, k], left=0, right=0) for k in range(3)], 1
-            )
-            upper, lower = self._fades
-            points = points + share * ((lower - upper) / 2)[:, None]
+            way = np.stack([np.interp(around, self._places, by[:, k]) for k in range(3)], axis=1)
+            points = points + way * field[:, None]
         return best
 
     def _wrong(self, meeting: Meeting) -> Doubles:
@@ -217,7 +244,9 @@ class Lips:
         normal = np.einsum("nk,nkd->nd", shares, normals)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         arm = samples - nearest
-        inside = (np.einsum("nd,nd->n", arm, normal) < 0) & (distance < _NEAR * self.mm)
+        # Beside the border of a sheet is not in it: what is in lies against the normal.
+        inside = (arm * normal).sum(axis=1) < -_AGAINST * distance
+        inside &= distance < _NEAR * self.mm
         signed = np.where(inside, -distance, distance)
         close = distance < 1e-6 * self.mm
         way = arm / np.maximum(distance, 1e-12)[:, None] * np.where(inside, -1, 1)[:, None]
@@ -234,10 +263,11 @@ class Lips:
         near = (column >= 0) & (apart <= least[column] + _RIM * self.mm)
         return vertices[near]
 
-    def _fade(self, rim: Ints) -> Doubles:
-        """float64[V]: 1 at a rim, 0 where the skin is far from it."""
-        away = _along(self.skin, rim, _FADE * self.mm) / self.mm
-        return np.asarray(1 - smooth_step((away - _BAND) / (_FADE - _BAND)))
+    def _fade(self, rim: Ints, widest: float) -> Doubles:
+        """float64[V]: 1 at a rim, 0 where the skin is far from it; widest: mm that it goes."""
+        reach = max(_FADE, _SOFTER * widest)
+        away = _along(self.skin, rim, reach * self.mm) / self.mm
+        return np.asarray(1 - smooth_step((away - _BAND) / (reach - _BAND)))
 
 
 def _labels(expressions: Mapping[str, Doubles], count: int) -> tuple[Ints, Ints]:
@@ -297,16 +327,18 @@ def _along(skin: Surface, begin: Ints, farthest: float) -> Doubles:
     return out
 
 
-def _straight(ways: Doubles, weights: Doubles) -> Doubles:
+def _straight(ways: Doubles, weights: Doubles, rounds: int) -> Doubles:
     """float64[COLUMNS, 3] of length 1: each way as its neighbours go, by what is wrong there."""
     out = np.abs(weights)[:, None] * ways
-    for _ in range(2):
+    for _ in range(rounds):
         wide = np.pad(out, ((1, 1), (0, 0)), mode="edge")
         out = (wide[:-2] + 2 * wide[1:-1] + wide[2:]) / 4
     length = np.linalg.norm(out, axis=1, keepdims=True)
     return np.where(length > 1e-12, out / np.maximum(length, 1e-12), [0.0, 1.0, 0.0])
 
 
-def _even(values: Doubles) -> Doubles:
-    wide = np.pad(values, 1, mode="edge")
-    return np.asarray((wide[:-2] + 2 * wide[1:-1] + wide[2:]) / 4)
+def _even(values: Doubles, rounds: int) -> Doubles:
+    for _ in range(rounds):
+        wide = np.pad(values, 1, mode="edge")
+        values = (wide[:-2] + 2 * wide[1:-1] + wide[2:]) / 4
+    return values

@@ -22,6 +22,7 @@ Pose = tuple[str, ...]
 Progress = Callable[[float], bool | None]
 _BLINK, _OPEN = "eyeBlink", "jawOpen"
 _CLOSE = ("mouthLipsTogether", "mouthClose")  # what closes the mouth of an open jaw
+_ELSEWHERE = "tongue"  # what moves other meshes
 _WELDED = 2  # columns of the mouth: near its corners lips are one
 _CUT = 0.002  # cm of lids in the eye that are left alone
 
@@ -39,7 +40,8 @@ class Repaired:
     """What repair makes.
 
     Attributes:
-        expressions: float64[V, 3] by raw control.
+        expressions: float64[V, 3] by raw control; also of those that move skin together with
+            others alone, such as what closes the mouth of an open jaw.
         combinations: float64[V, 3] by the controls that are 1 together, all of the way.
         report: what was wrong, and what is left.
     """
@@ -64,7 +66,7 @@ def repair(
     Args:
         target: the skin at rest, cm, standing.
         faces: its polygons.
-        parts: eyes, teeth and the like.
+        parts: eyes, teeth and the like; its notes get those of the report.
         landmarks: corners of the mouth are used; None: they are sought.
         registered: how the template lies on the target; not needed by what is repaired here.
         expressions: float64[V, 3] by raw control.
@@ -75,8 +77,8 @@ def repair(
         Stopped: progress said False.
     """
     del registered
-    closing = _closing(expressions, combinations)
-    work = _Repair(target, faces, parts, landmarks, expressions, closing)
+    closing = closing_pose(expressions, combinations)
+    work = Repairing(target, faces, parts, landmarks, expressions, closing)
     singles: dict[str, Doubles] = {}
     jobs = len(expressions) + len(combinations) + 1
     for number, (name, way) in enumerate(expressions.items()):
@@ -92,11 +94,20 @@ def repair(
         out[pose] = work.repaired(pose, np.asarray(way, np.float64) + sum(changes, np.zeros(1)))
         if progress is not None and progress(number / jobs) is False:
             raise Stopped
+    for name in dict.fromkeys(name for pose in out for name in pose):
+        if name not in singles and not name.startswith(_ELSEWHERE):
+            singles[name] = np.zeros_like(target.points)
+    parts.notes.extend(work.report.notes)
     return Repaired(singles, out, work.report)
 
 
-def _closing(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:
-    """The open jaw with closed lips; empty where the face has no such controls."""
+def closing_pose(expressions: Mapping[str, Doubles], combinations: Mapping[Pose, Doubles]) -> Pose:
+    """The open jaw with closed lips; empty where the face has no such controls.
+
+    Args:
+        expressions: by raw control.
+        combinations: by the controls that are 1 together.
+    """
     names = dict.fromkeys([*expressions, *(name for pose in combinations for name in pose)])
     lips = [name for name in names if name.startswith(_CLOSE)]
     return (_OPEN, *lips) if lips and _OPEN in expressions else ()
@@ -121,7 +132,9 @@ def _closes_eye(pose: Pose, side: str) -> bool:
     return _BLINK + side in pose
 
 
-class _Repair:
+class Repairing:
+    """The lids, lips, teeth and skin of one target."""
+
     def __init__(
         self,
         target: Surface,
@@ -131,6 +144,12 @@ class _Repair:
         expressions: Mapping[str, Doubles],
         closing: Pose,
     ) -> None:
+        """Begins; see repair.
+
+        Args:
+            target, faces, parts, landmarks, expressions: as there.
+            closing: what closing_pose gives.
+        """
         self.report = Report()
         self.target = target
         self.eyelids: dict[str, Eyelids] = {}
@@ -154,18 +173,27 @@ class _Repair:
         self.contacts = Contacts(target, faces, self.bodies)
 
     def repaired(self, pose: Pose, way: Doubles) -> Doubles:
-        """float64[V, 3] of a pose; its faults go into the report."""
+        """float64[V, 3] of a pose; its faults go into the report.
+
+        Args:
+            pose: raw controls that are 1.
+            way: float64[V, 3], what they do together.
+        """
         if not way.any():
             return way
         before = self.faults(pose, way)
+        closes = self._closes_mouth(pose)
+        if closes and self.lips.too_far(self.target.points + way):
+            closes = False
+            self.report.notes.append(
+                f"{'+'.join(pose)} leaves the lips {before.lip_gap:.0f} mm apart, too far to be "
+                "brought together: is the mouth open at rest?"
+            )
         out = self._at_eyes(pose, way)
-        if self._closes_mouth(pose):
-            out = self.lips.closed(self.target.points + out) - self.target.points
+        out = self._lips_closed(out) if closes else out
         if before.volume > LEAST:
-            pushed = self.contacts.pushed(out, pose)
-            if self._closes_mouth(pose):
-                pushed = self.lips.closed(self.target.points + pushed) - self.target.points
-            out = pushed
+            out = self.contacts.pushed(out, pose)
+            out = self._lips_closed(out) if closes else out
         changed = out is not way and bool(np.abs(out - way).max(initial=0.0) > 0)
         after = self.faults(pose, out) if changed else before
         if before != Faults() or after != Faults() or self._closes(pose):
@@ -173,7 +201,12 @@ class _Repair:
         return out
 
     def faults(self, pose: Pose, way: Doubles) -> Faults:
-        """What is wrong with a pose."""
+        """What is wrong with a pose.
+
+        Args:
+            pose: raw controls that are 1.
+            way: float64[V, 3], what they do together.
+        """
         gap = cut = 0.0
         for side, lids in self.eyelids.items():
             turn = eye_turn_of(side, pose)
@@ -199,6 +232,9 @@ class _Repair:
             elif (turn is not None or lids.moves(out)) and lids.cut(out, turn) > _CUT:
                 out = lids.lifted(out, turn)
         return out
+
+    def _lips_closed(self, way: Doubles) -> Doubles:
+        return self.lips.closed(self.target.points + way) - self.target.points
 
     def _closes_mouth(self, pose: Pose) -> bool:
         return self.lips.found and bool(self.lip_controls) and set(self.lip_controls) <= set(pose)

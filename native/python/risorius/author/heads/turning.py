@@ -162,6 +162,8 @@ def _divided(
         return [part]
     count = int(islands.max()) + 1
     of_island = np.full(count, 2)
+    with_polygons = np.zeros(count, bool)
+    with_polygons[islands[first_vertices(part)]] = True
     for number, eye in enumerate(eyes):
         away = np.linalg.norm(part.mesh.positions - eye.ball.middle, axis=1)
         furthest = np.zeros(count)
@@ -169,7 +171,7 @@ def _divided(
         reach = _INSIDE * eye.ball.radius
         if _EYE.search(part.name):
             reach *= 1.2  # a cornea that bulges
-        of_island[furthest < reach] = number
+        of_island[(furthest < reach) & with_polygons] = number
         of_island[islands[own[number]]] = number
     if (of_island == 2).all():
         return [part]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author --conform: a DNA file's own topology takes the form of a head."""
+"""risorius author --conform: conform a DNA file to a head."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from ...mixing.regions import Masks
 from ...mixing.textures import mix_textures, texture_folder
 from ..files import CommandLineError, read, refuse_same_file
 
-# Options of `risorius author` that say what a rig is to be, which a face has already.
+# Options of `risorius author` that configure a new rig. A conformed face keeps its rig.
 _NOT_ITS = (
     "names", "joints_only", "exact", "tolerance", "bound", "correctives", "report", "onto",
     "strength", "no_repair", "write_landmarks", "rig",
@@ -32,14 +32,14 @@ _NOT_ITS = (
 
 
 class Clock(Protocol):
-    """Says what is done now, and how far it is."""
+    """Prints the current step and its progress."""
 
     def line(self, text: str) -> None: ...
     def __call__(self, share: float) -> None: ...
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The option --conform.
+    """Add the option --conform.
 
     Args:
         parser: of `risorius author`.
@@ -48,9 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--conform",
         type=Path,
         metavar="HEAD",
-        help="give the face that is named, a DNA file, the form of this head (OBJ, glTF, FBX, a "
-        "folder of OBJ files, another DNA file; a sculpt of the face as it is): its names, counts "
-        "and layers stay",
+        help="conform the DNA file to this head (OBJ, glTF, FBX, a folder of OBJ files, another "
+        "DNA file, or a sculpt of the face): its topology, names, counts and layers stay",
     )
 
 
@@ -76,7 +75,7 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
         clock.line(f"landmarks of {known}")
         marks = read_landmarks(known)
     wishes = Wishes(height_mm=args.height_mm or 0.0, scale=args.scale or 0.0)
-    clock.line(f"{args.spec.name} takes the form of {args.conform.name}")
+    clock.line(f"{args.spec.name} is conformed to {args.conform.name}")
     made = conform_face(
         dna,
         parts,
@@ -99,7 +98,7 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
 
 
 def _head(path: Path) -> tuple[list[HeadPart], str]:
-    """The meshes of a head and the unit of its format; another face is a head too."""
+    """The meshes of a head and the unit of its format. A DNA file can be a head."""
     if path.suffix.lower() != ".dna":
         return read_head(path)
     other = read(str(path), "dna")
@@ -118,7 +117,7 @@ def _check(args: argparse.Namespace) -> None:
 
 
 def _moved_mm(dna: Dna, made: Conformed) -> tuple[float, float]:
-    """How far the skin's vertices moved from their middle: mean and largest, mm."""
+    """Mean and largest displacement of the skin in mm, without the displacement of its centre."""
     before = np.asarray(dna.meshes[skin_of(dna)].positions, np.float64)
     way = made.moved - made.moved.mean(axis=0) - before + before.mean(axis=0)
     far = mm_of(dna) * np.linalg.norm(way, axis=1)
@@ -126,11 +125,11 @@ def _moved_mm(dna: Dna, made: Conformed) -> tuple[float, float]:
 
 
 def as_json(dna: Dna, made: Conformed) -> dict[str, object]:
-    """What became of the face, for a program.
+    """The result as JSON.
 
     Args:
-        dna: the face before.
-        made: after.
+        dna: the source face.
+        made: the conformed face.
     """
     mean, largest = _moved_mm(dna, made)
     return {
@@ -143,16 +142,16 @@ def as_json(dna: Dna, made: Conformed) -> dict[str, object]:
 
 
 def as_line(path: Path, dna: Dna, made: Conformed) -> str:
-    """What became of the face.
+    """The result as a line of text.
 
     Args:
-        path: where it was written.
-        dna: the face before.
-        made: after.
+        path: the written file.
+        dna: the source face.
+        made: the conformed face.
     """
     mean, largest = _moved_mm(dna, made)
     return (
         f"{path}: {counted(len(dna.joint_names), 'joint')} and {counted(len(dna.meshes), 'mesh')} "
-        f"in the form of the head, which differs from the face by {mean:.1f} mm in the mean and "
-        f"{largest:.1f} at most"
+        f"conformed to the head; skin vertices moved by {mean:.1f} mm on average and by "
+        f"{largest:.1f} mm at most"
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from ... import Dna, load
+from ...anyhead.borrowing import lend_materials
 from ...anyhead.default import default_template
 from ...anyhead.landmarks.marks import landmarks_path, landmarks_text, read_landmarks
 from ...anyhead.onto import OntoOptions, onto, shape_face
@@ -22,7 +23,15 @@ from ...base.reading import require_regular
 from ...files import fileio
 from ..files import CommandLineError, number
 
-_OWN = ("landmarks", "strength", "no_repair", "write_landmarks", "rig")  # options of --onto alone
+_HEAD_MM = 240.0
+_OWN = (
+    "landmarks",
+    "strength",
+    "no_repair",
+    "write_landmarks",
+    "mesh",
+    "rig",
+)  # options of --onto alone
 
 
 class Clock(Protocol):
@@ -69,6 +78,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         default=None,
         help="leave lids, lips and teeth as they were carried over",
+    )
+    group.add_argument(
+        "--mesh", metavar="NAME", help="the mesh that is the face, where there are several heads"
     )
     group.add_argument(
         "--rig",
@@ -118,6 +130,8 @@ def spec_of(args: argparse.Namespace) -> Spec:
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
+    if spec.options.tolerance_mm is None:  # a share of the head, and not of the body below it
+        spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
 
 
@@ -146,7 +160,7 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
         1.0 if args.strength is None else args.strength,
         not args.no_repair,
         marks,
-        Wishes(height_mm=args.height_mm or 0.0, scale=args.scale or 0.0),
+        Wishes(args.mesh or "", height_mm=args.height_mm or 0.0, scale=args.scale or 0.0),
         args.threads,
     )
     made = onto(str(args.onto), parts, unit, template, options, clock, clock.line)
@@ -154,6 +168,9 @@ def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, 
     files = {}
     if args.write_landmarks is not None:
         files[args.write_landmarks] = landmarks_text(made.landmarks).encode()
+    if args.spec is not None:
+        own = {part.source for part in parts}
+        lend_materials(made.shapes.parts, template, args.spec, own)
     read = shape_face(made, template, str(args.onto))
     return replace(read, odd=made.notes + read.odd), files
 

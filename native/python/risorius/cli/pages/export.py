@@ -10,6 +10,8 @@ import risorius
 
 from ...files import fileio
 from ...gameface import GROUPS, Wishes, export
+from ...gameface.avatar import humanoid, licence
+from ...gameface.takes import frames_of
 from ..files import (
     CommandLineError,
     number,
@@ -23,17 +25,19 @@ from ..files import (
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
         "export",
-        help="export the face as glTF with morph targets: ARKit, visemes, VRM",
-        description="Writes a .glb with the evaluated rig at each pose as a morph target, joints "
-        "and correctives included, for programs that drive targets by name.",
+        help="export the face as glTF or VRM with morph targets: ARKit, visemes, expressions",
+        description="Writes a .glb or .vrm with the evaluated rig at each pose as a morph target, "
+        "joints and correctives included, for programs that drive targets by name.",
     )
     parser.add_argument("file", type=Path, help="the DNA file; textures next to it are included")
-    parser.add_argument("-o", "--out", type=Path, metavar="FACE.glb", help="default: FILE.glb")
+    parser.add_argument(
+        "-o", "--out", type=Path, metavar="FACE.glb", help="default: FILE.glb or FILE.vrm"
+    )
     parser.add_argument(
         "--shapes",
-        default="arkit,visemes",
         metavar="GROUPS",
-        help=f"groups, separated by commas: {', '.join(GROUPS)}; all: each control by its own name",
+        help=f"groups, separated by commas: {', '.join(GROUPS)}; all: each control by its own "
+        "name; default: arkit,visemes, and vrm,arkit for a VRM",
     )
     parser.add_argument("--lod", type=whole_number(0, 65535), default=0, metavar="N")
     parser.add_argument(
@@ -64,23 +68,50 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="add targets for combinations of two that deviate more, with the JSON and the script "
         "that drive them",
     )
+    parser.add_argument(
+        "--takes",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="TAKE",
+        help="captures with ARKit's units: combinations are fitted to their frames too",
+    )
+    parser.add_argument(
+        "--humanoid", choices=humanoid.KINDS, help="make up the bones of a body: those that VRM "
+        "needs, or all by Mixamo's names, as TalkingHead wants them",
+    )  # fmt: skip
+    parser.add_argument("--vrm", choices=licence.VERSIONS, help="write a VRM of this version")
+    parser.add_argument(
+        "--licence", type=Path, metavar="FILE.toml", help="name, authors and permissions of a VRM"
+    )
     parser.set_defaults(func=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    out: Path = args.out or args.file.with_suffix(".glb")
-    require_suffix(out, (".glb",), "-o")
+    suffix = ".vrm" if args.vrm else ".glb"
+    out: Path = args.out or args.file.with_suffix(suffix)
+    require_suffix(out, (suffix,), "-o")
     refuse_same_file(str(args.file), str(out))
     require_writable(out)
-    shapes = tuple(dict.fromkeys(args.shapes.split(",")))
+    if args.licence and not args.vrm:
+        raise CommandLineError("--licence is of a VRM: add --vrm 1.0 or --vrm 0.x")
+    if args.takes and args.within is None:
+        raise CommandLineError("--takes is for combinations: add --within, such as --within 0.5")
+    if args.no_skeleton and (args.vrm or args.humanoid):
+        raise CommandLineError("--no-skeleton: a VRM, and a humanoid, have a skeleton")
+    said = licence.read(args.licence, args.vrm) if args.licence else {}
+    default = "vrm,arkit" if args.vrm else "arkit,visemes"
+    shapes = tuple(dict.fromkeys((args.shapes or default).split(",")))
     for group in shapes:
         if group not in GROUPS:
             raise CommandLineError(f"--shapes: {', '.join(GROUPS)} were expected, found {group!r}")
+    frames = [frame for take in args.takes for frame in frames_of(take)]
     dna = risorius.load(args.file)
     rig = risorius.compile_cached(args.file)
     wishes = Wishes(
         shapes, args.lod, not args.no_skeleton, args.sparse, args.quantize, args.meshopt,
-        args.normals, args.textures, args.mb, args.most, args.within,
+        args.normals, args.textures, args.mb, args.most, args.within, frames,
+        args.humanoid or "", args.vrm or "", said,
     )  # fmt: skip
     made = export(dna, rig, args.file, out.name, wishes)
     fileio.write_all({out.with_name(name): data for name, data in made.files.items()})

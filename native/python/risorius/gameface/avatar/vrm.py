@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: MIT
+"""The tables that make a glTF a VRM: humanoid, expressions, look-at, first person, licence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from . import licence
+
+PRESETS = (
+    "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh",
+    "blink", "blinkLeft", "blinkRight", "lookUp", "lookDown", "lookLeft", "lookRight",
+)  # fmt: skip
+"""The preset expressions of VRM 1.0."""
+FEELINGS = PRESETS[:5]
+BLINKS = PRESETS[11:14]
+KINDS = {"Blink": ("blink",), "LookAt": PRESETS[-4:], "Mouth": ("aa", "ih", "ou", "ee", "oh")}
+"""What an expression may hold back, and the presets of it."""
+_OLD = {
+    "happy": "joy", "angry": "angry", "sad": "sorrow", "relaxed": "fun", "neutral": "neutral",
+    "aa": "a", "ih": "i", "ou": "u", "ee": "e", "oh": "o", "blink": "blink",
+    "blinkLeft": "blink_l", "blinkRight": "blink_r", "lookUp": "lookup", "lookDown": "lookdown",
+    "lookLeft": "lookleft", "lookRight": "lookright",
+}  # fmt: skip
+_OLD_TITLES = {
+    "blink_l": "Blink_L", "blink_r": "Blink_R", "lookup": "LookUp", "lookdown": "LookDown",
+    "lookleft": "LookLeft", "lookright": "LookRight",
+}  # fmt: skip
+_OLD_FIRST = {"auto": "Auto", "both": "Both", "thirdPersonOnly": "ThirdPersonOnly"}
+_STRAIGHT = [0, 0, 0, 1, 1, 1, 1, 0]  # of Unity's curves: from 0 to 1
+# The thumb begins one part later in VRM 0.x.
+_OLD_THUMB = {"ThumbMetacarpal": "ThumbProximal", "ThumbProximal": "ThumbIntermediate"}
+
+
+@dataclass(frozen=True)
+class Manner:
+    """What is measured at the face.
+
+    Attributes:
+        look: degrees that the eyes turn at lookLeft or lookRight, lookUp and lookDown; without
+            those that the face has no eyes for.
+        held: preset -> those of KINDS that it does not go with.
+    """
+
+    look: Mapping[str, float] = field(default_factory=dict)
+    held: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A mesh of the file.
+
+    Attributes:
+        node, mesh: their numbers.
+        targets: names of its morph targets.
+        first: auto, both or thirdPersonOnly: whether its owner sees it.
+    """
+
+    node: int
+    mesh: int
+    targets: Sequence[str]
+    first: str
+
+
+@dataclass(frozen=True)
+class Avatar:
+    """What the tables are made of.
+
+    Attributes:
+        bones: VRM's name of a bone -> node.
+        eyes: metres from the head's joint to the middle of the eyes.
+        meshes: those of the file.
+        own: names of targets that are expressions by their own name.
+        said: the licence.
+        manner: what was measured.
+    """
+
+    bones: Mapping[str, int]
+    eyes: Sequence[float]
+    meshes: Sequence[Shown]
+    own: Sequence[str]
+    said: Mapping[str, Any]
+    manner: Manner
+
+    def binds(self, name: str) -> Iterator[tuple[Shown, int]]:
+        """Meshes that have a target, and its number there."""
+        for shown in self.meshes:
+            if name in shown.targets:
+                yield shown, shown.targets.index(name)
+
+
+def extension(
+    version: str, avatar: Avatar, materials: Sequence[Mapping[str, Any]]
+) -> tuple[str, dict[str, Any]]:
+    """The name and the table of the extension.
+
+    Args:
+        version: 1.0 or 0.x.
+        avatar: of the face.
+        materials: of the file.
+    """
+    return ("VRMC_vrm", _new(avatar)) if version == "1.0" else ("VRM", _old(avatar, materials))
+
+
+def _new(avatar: Avatar) -> dict[str, Any]:
+    presets = {name: _expression(avatar, name) for name in PRESETS if _is_there(avatar, name)}
+    custom = {name: _expression(avatar, name) for name in avatar.own if name not in PRESETS}
+    out: dict[str, Any] = {
+        "specVersion": "1.0",
+        "meta": licence.meta_1(avatar.said),
+        "humanoid": {"humanBones": {name: {"node": n} for name, n in avatar.bones.items()}},
+        "firstPerson": {
+            "meshAnnotations": [{"node": s.node, "type": s.first} for s in avatar.meshes]
+        },
+        "expressions": {"preset": presets, **({"custom": custom} if custom else {})},
+    }
+    if avatar.manner.look:
+        out["lookAt"] = {"offsetFromHeadBone": list(avatar.eyes), "type": "expression"}
+        for key, degrees in _ranges(avatar.manner):
+            out["lookAt"][f"rangeMap{key}"] = {"inputMaxValue": degrees, "outputScale": 1.0}
+    return out
+
+
+def _is_there(avatar: Avatar, name: str) -> bool:
+    return name == "neutral" or any(True for _ in avatar.binds(name))
+
+
+def _expression(avatar: Avatar, name: str) -> dict[str, Any]:
+    held = avatar.manner.held.get(name, ())
+    binds = [{"node": s.node, "index": i, "weight": 1.0} for s, i in avatar.binds(name)]
+    out: dict[str, Any] = {"isBinary": False}
+    out.update({f"override{kind}": "blend" if kind in held else "none" for kind in KINDS})
+    return {**out, "morphTargetBinds": binds} if binds else out
+
+
+def _ranges(manner: Manner) -> Iterator[tuple[str, float]]:
+    """The maps of a look, and the degrees at which its expression is fully on."""
+    sideways = [manner.look[n] for n in ("lookLeft", "lookRight") if n in manner.look]
+    if sideways:
+        mean = sum(sideways) / len(sideways)
+        yield from (("HorizontalInner", mean), ("HorizontalOuter", mean))
+    for name, key in (("lookDown", "VerticalDown"), ("lookUp", "VerticalUp")):
+        if name in manner.look:
+            yield key, manner.look[name]
+
+
+def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    groups = [_group(avatar, n, _OLD[n]) for n in _OLD if _is_there(avatar, n)]
+    more = [n for n in ("surprised", *avatar.own) if n not in _OLD and _is_there(avatar, n)]
+    groups += [_group(avatar, name, "unknown") for name in dict.fromkeys(more)]
+    first: dict[str, Any] = {
+        "firstPersonBone": avatar.bones["head"],
+        "firstPersonBoneOffset": dict(zip("xyz", avatar.eyes, strict=True)),
+        "meshAnnotations": [
+            {"mesh": s.mesh, "firstPersonFlag": _OLD_FIRST[s.first]} for s in avatar.meshes
+        ],
+        "lookAtTypeName": "BlendShape",
+    }
+    for key, degrees in _ranges(avatar.manner):
+        first[f"lookAt{key}"] = {"curve": _STRAIGHT, "xRange": degrees, "yRange": 1.0}
+    return {
+        "exporterVersion": "Risorius",
+        "specVersion": "0.0",
+        "meta": licence.meta_0(avatar.said),
+        "humanoid": {
+            "humanBones": [
+                {"bone": _old_bone(name), "node": node, "useDefaultValues": True}
+                for name, node in avatar.bones.items()
+            ]
+        },
+        "firstPerson": first,
+        "blendShapeMaster": {"blendShapeGroups": groups},
+        "secondaryAnimation": {"boneGroups": [], "colliderGroups": []},
+        "materialProperties": [_plain(material["name"]) for material in materials],
+    }
+
+
+def _group(avatar: Avatar, name: str, preset: str) -> dict[str, Any]:
+    title = _OLD_TITLES.get(preset, preset.capitalize()) if preset != "unknown" else name
+    title = "Surprised" if name == "surprised" else title
+    return {
+        "name": title,
+        "presetName": preset,
+        "binds": [{"mesh": s.mesh, "index": i, "weight": 100} for s, i in avatar.binds(name)],
+        "materialValues": [],
+        "isBinary": False,
+    }
+
+
+def _old_bone(name: str) -> str:
+    for side in ("left", "right"):
+        part = name.removeprefix(side)
+        if part in _OLD_THUMB:
+            return side + _OLD_THUMB[part]
+    return name
+
+
+def _plain(name: str) -> dict[str, Any]:
+    """A material that programs show as glTF says it."""
+    tables = ("floatProperties", "vectorProperties", "textureProperties", "keywordMap", "tagMap")
+    return {
+        "name": name, "shader": "VRM_USE_GLTFSHADER", "renderQueue": 2000,
+        **{table: {} for table in tables},
+    }  # fmt: skip

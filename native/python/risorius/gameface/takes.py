@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""Frames of captures, as weights of ARKit's units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from .. import importing
+from ..controls import vocabulary
+from ..controls.arkit import mapping
+from .errors import GameFaceError
+
+MOST = 500
+"""Frames of a capture that are taken, spread evenly."""
+
+
+def frames_of(path: Path) -> list[dict[str, float]]:
+    """Unit -> weight, for frames of a capture.
+
+    Args:
+        path: of a file of Live Link Face, or another one whose curves are ARKit's units.
+
+    Raises:
+        GameFaceError: no curve is a unit.
+        AnimationFileError: the file is damaged, or no animation.
+    """
+    clip = importing.read(path).clip
+    arkit = vocabulary.vocabulary(vocabulary.ARKIT)
+    found = {arkit.spelled(name): row for name, row in zip(clip.names, clip.curves, strict=True)}
+    rows = {unit: found[unit] for unit in mapping() if unit in found}
+    if not rows:
+        raise GameFaceError(
+            f"{path}: curves of ARKit's units were expected, such as jawOpen; found "
+            f"{', '.join(clip.names[:6]) or 'none'}"
+        )
+    every = max(1, -(-clip.frame_count // MOST))
+    return [
+        {unit: float(row[i]) for unit, row in rows.items()}
+        for i in range(0, clip.frame_count, every)
+    ]

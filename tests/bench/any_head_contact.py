@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: MIT
+"""What the repair leaves of what transfer breaks: lids, lips, skin in teeth, torn skin.
+
+    python tests/bench/any_head_contact.py HEAD.obj... [--template FACE.dna] [--deepest 3]
+
+Each head gets the template's expressions without a click, and these are repaired. A row before and
+a row after, with the worst of all expressions and correctives: *gap*, the widest place at which a
+blink shows the eye, between the lids by rays from the eye's middle; *seen*, how much of an eye five
+people in front of the face see at both blinks (rays of their own, which know nothing of lids);
+*cut*, how deep the outside of lids lies in the eye; *lips*, the widest gap and the deepest cut of
+lips with an open jaw and all that closes the mouth; *teeth*, mm3 of skin in teeth and gums beyond
+rest as SkinChecker counts it, the sum of the widest `--deepest` expressions; *torn*, polygons of
+more than 2.5 times their area, all expressions together.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+import numpy as np
+import risorius
+from risorius._native import ClosestPoints
+from risorius.anyhead.default import default_template
+from risorius.anyhead.fittings import Bodies, complete, sort_parts
+from risorius.anyhead.laying import lay
+from risorius.anyhead.onto import OntoOptions, whole_ways
+from risorius.anyhead.reading import read_head
+from risorius.anyhead.repair import repair
+from risorius.anyhead.repair.contact import Contacts
+from risorius.anyhead.repair.repairing import Repairing, closing_pose
+from risorius.anyhead.repair.report import Faults
+from risorius.anyhead.standing import stand
+from risorius.anyhead.surface import Surface
+from risorius.anyhead.transfer.template import read_template
+from risorius.anyhead.transfer.transfer import TransferOptions, transfer
+from risorius.base.errors import RisoriusError
+
+VIEWS = ((0, 0), (-25, 0), (25, 0), (0, 15), (0, -15))  # degrees aside and up
+PIXEL = 0.02  # cm
+HEADS = ("head", "gap mm", "seen mm2", "cut mm", "lips mm", "lips in mm", "teeth mm3", "torn")
+
+
+def seen_of_eyes(skin, triangles, eyes):
+    """mm2 of eyes that are seen from in front, of the viewer who sees most."""
+    worst = 0.0
+    for aside, up in VIEWS:
+        a, u = np.radians(aside), np.radians(up)
+        way = np.array([np.sin(a) * np.cos(u), np.sin(u), np.cos(a) * np.cos(u)])
+        side = np.cross([0.0, 1.0, 0.0], way)
+        side /= np.linalg.norm(side)
+        high = np.cross(way, side)
+        for ball in eyes.values():
+            at = np.arange(-ball.radius, ball.radius, PIXEL)
+            x, y = (grid.ravel() for grid in np.meshgrid(at, at))
+            begin = ball.middle + x[:, None] * side + y[:, None] * high + 5 * ball.radius * way
+            near = np.linalg.norm(skin - ball.middle, axis=1) < 3 * ball.radius
+            own = triangles[near[triangles].any(axis=1)]
+            rays = np.broadcast_to(-way, begin.shape)
+            eye = ClosestPoints(ball.points, ball.triangles.astype(np.int32)).first_hit(begin, rays)
+            lid = ClosestPoints(skin, own.astype(np.int32)).first_hit(begin, rays)
+            hit = (eye[0] >= 0) & ((lid[0] < 0) | (eye[2] < lid[2]))
+            worst = max(worst, float(hit.sum()) * PIXEL**2 * 100)
+    return worst
+
+
+def blinks(ways):
+    return sum((way for name, way in ways.items() if name.startswith("eyeBlink")), np.zeros(1))
+
+
+def row_of(target, fitted, singles, pairs, work, contacts, bodies, most):
+    """The worst of each kind."""
+    poses = {(name,): way for name, way in singles.items()} | pairs
+    faults = {pose: work.faults(pose, way) for pose, way in poses.items()}
+    closing = set(closing_pose(singles, pairs))
+    shut = [f for pose, f in faults.items() if closing and set(pose) == closing] or [Faults()]
+    deep = sorted(faults, key=lambda pose: -faults[pose].volume)[:most]
+    volume = sum(
+        contacts.volume_by_checker(poses[pose], pose) for pose in deep if faults[pose].volume > 0
+    )
+    seen = seen_of_eyes(target.points + blinks(singles), target.triangles, fitted.eyes)
+    return (
+        max(f.lid_gap for f in faults.values()), seen, max(f.cut for f in faults.values()),
+        shut[0].lip_gap, shut[0].lip_cut, volume, sum(f.stretched for f in faults.values()),
+    )  # fmt: skip
+
+
+def table(name, rows):
+    for when, values in zip(("before", "after"), rows, strict=True):
+        cells = " | ".join(f"{value:.2f}" for value in values[:-1])
+        print(f"| {name} {when} | {cells} | {values[-1]} |", flush=True)
+
+
+def measure(path, template, source, options):
+    parts, unit = read_head(path)
+    head = stand(path.name, parts, unit, options.wishes, options.marks)
+    found = sort_parts(head.parts)
+    target = Surface.of_polygons(found.face.mesh.positions, found.face.mesh.faces)
+    laid = lay(source, target, head.found)
+    carried = transfer(source, target, laid.points, laid.trust, TransferOptions(options.strength))
+    ways = whole_ways(carried.ways)
+    fitted = complete(found, template, laid.points)
+    singles = {pose[0]: way for pose, way in ways.items() if len(pose) == 1}
+    pairs = {pose: way for pose, way in ways.items() if len(pose) > 1}
+    began = time.process_time()
+    faces = fitted.face.mesh.faces
+    out = repair(target, faces, fitted, head.found.landmarks, laid, singles, pairs)
+    took = time.process_time() - began
+    return target, fitted, head, (singles, pairs), out, took
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("heads", nargs="+", type=Path)
+    parser.add_argument("--template", type=Path)
+    parser.add_argument("--strength", type=float, default=1.0)
+    parser.add_argument("--deepest", type=int, default=3)
+    args = parser.parse_args()
+    template = risorius.load(args.template) if args.template else default_template()
+    source = read_template(template)
+    print("| " + " | ".join(HEADS) + " |\n|" + "---|" * len(HEADS))
+    for path in args.heads:
+        try:
+            target, fitted, head, before, out, took = measure(
+                path, template, source, OntoOptions(args.strength)
+            )
+        except RisoriusError as error:
+            print(f"| {path.stem} | {error} |")
+            continue
+        singles, pairs = before
+        work = Repairing(
+            target, fitted.face.mesh.faces, fitted, head.found.landmarks, singles,
+            closing_pose(singles, pairs),
+        )  # fmt: skip
+        bodies = Bodies(fitted, target, singles)
+        contacts = Contacts(target, fitted.face.mesh.faces, bodies)
+        rows = [
+            row_of(target, fitted, *ways, work, contacts, bodies, args.deepest)
+            for ways in ((singles, pairs), (out.expressions, out.combinations))
+        ]
+        table(path.stem, rows)
+        print(f"<!-- {len(target.points):,} vertices, {took:.0f} CPU s: "
+              f"{'; '.join([*fitted.notes, *out.report.notes])} -->", flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

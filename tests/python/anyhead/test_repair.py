@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""Lids close on an eye, lips meet, and neither is changed where nothing is wrong."""
+
+import copy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from risorius._native import ClosestPoints
+from risorius.anyhead.errors import Stopped
+from risorius.anyhead.eyes.eyelids import find_eyelids
+from risorius.anyhead.fittings import Bodies, sort_parts
+from risorius.anyhead.repair import repair
+from risorius.anyhead.repair.contact import Contacts
+from risorius.anyhead.surface import Surface
+from risorius.author.heads.turning import look_turn
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from support.plain_head import (
+    EYE,
+    HALF,
+    MOUTH,
+    RADIUS,
+    TOGETHER,
+    arch,
+    eyes_and_teeth,
+    mask,
+    part,
+)
+
+CLOSED = ("jawOpen", *TOGETHER)
+
+
+class Corners:
+    points = {
+        "mouth_corner_R": np.array([-HALF, MOUTH, 8.2]),
+        "mouth_corner_L": np.array([HALF, MOUTH, 8.2]),
+    }
+
+
+@pytest.fixture(scope="module")
+def head():
+    return mask()
+
+
+@pytest.fixture(scope="module")
+def skin(head):
+    return Surface.of_polygons(head.points, head.faces)
+
+
+@pytest.fixture(scope="module")
+def fitted(head):
+    return sort_parts([part("face", head.points, head.faces), *eyes_and_teeth()])
+
+
+@pytest.fixture(scope="module")
+def mended(head, skin, fitted):
+    return repair(skin, head.faces, fitted, Corners(), None, head.ways, {CLOSED: head.closed})
+
+
+def seen(skin, points, ball):
+    """How many rays from in front end at the eye, and the most above each other, by a grid of
+    0.2 mm; no code of the repair."""
+    at = np.arange(-RADIUS, RADIUS, 0.02)
+    x, y = (grid.ravel() for grid in np.meshgrid(at, at))
+    begin = ball.middle + np.stack([x, y, np.full(len(x), 9.0)], axis=1)
+    rays = np.broadcast_to([0.0, 0.0, -1.0], begin.shape)
+    eye = ClosestPoints(ball.points, ball.triangles.astype(np.int32)).first_hit(begin, rays)
+    lid = ClosestPoints(points, skin.triangles.astype(np.int32)).first_hit(begin, rays)
+    hit = (eye[0] >= 0) & ((lid[0] < 0) | (eye[2] < lid[2]))
+    return int(hit.sum()), int(hit.reshape(len(at), -1).sum(axis=0).max())
+
+
+@pytest.mark.parametrize("side", ["L", "R"])
+def test_a_blink_that_stops_short_shows_nothing_of_the_eye(head, skin, fitted, mended, side):
+    ball, name = fitted.eyes[side], f"eyeBlink{side}"
+    assert seen(skin, skin.points + head.ways[name], ball)[1] >= 10
+    assert seen(skin, skin.points + mended.expressions[name], ball)[1] <= 1
+    before, after = mended.report.rows[name]
+    assert before.lid_gap > 2.0
+    assert after.lid_gap <= 0.15
+    assert after.cut <= 0.05
+
+
+def test_a_blink_moves_its_own_lids_alone(head, skin, mended):
+    away = np.linalg.norm(skin.points - EYE, axis=1) > 2 * RADIUS
+    change = mended.expressions["eyeBlinkL"] - head.ways["eyeBlinkL"]
+    assert np.abs(change[away]).max() == 0
+    assert np.abs(change).max() > 0.1
+
+
+def test_lids_that_close_already_stay_as_they_are(skin, fitted, mended):
+    lids = find_eyelids(skin, fitted.eyes["L"])
+    closed = mended.expressions["eyeBlinkL"]
+    assert np.abs(lids.closed(closed) - closed).max() < 0.02
+
+
+def test_lids_of_an_eye_that_turns_are_lifted_out_of_what_bulges(skin, fitted):
+    """A lid that is pressed 1 mm into the eye while that looks down."""
+    lids = find_eyelids(skin, fitted.eyes["L"])
+    arm = skin.points - EYE
+    inwards = np.where(
+        (np.linalg.norm(arm, axis=1) < 1.2 * RADIUS)[:, None] & (arm[:, 1:2] > 0.6), -0.12 * arm, 0
+    )
+    turn = look_turn("eyeLookDown")
+    assert lids.cut(inwards, turn) > 0.05
+    assert lids.cut(lids.lifted(inwards, turn), turn) < 0.005
+
+
+def test_an_eye_behind_skin_has_no_lids(skin, fitted):
+    hidden = fitted.eyes["L"]
+    back = type(hidden)("L", hidden.middle * [1, -1, 0.8], RADIUS, hidden.points, hidden.triangles)
+    assert find_eyelids(skin, back) is None
+
+
+def test_lips_meet_where_an_open_jaw_is_closed(head, skin, mended):
+    before, after = mended.report.rows["+".join(CLOSED)]
+    assert before.lip_gap > 1.5
+    assert after.lip_gap <= 0.3
+    assert after.lip_cut <= 0.15
+    # By a measure of its own: the lower line below the upper one, where both were one line.
+    points = skin.points + mended.combinations[CLOSED]
+    line = np.flatnonzero(np.abs(skin.points[:, 1] - MOUTH) < 0.01)
+    middle = line[np.abs(skin.points[line, 0]) < 0.6 * HALF]
+    x = skin.points[middle, 0].round(3)
+    apart = [np.ptp(points[middle[x == value], 1]) for value in np.unique(x)]
+    assert len(apart) > 10
+    assert max(apart) < 0.05
+
+
+def test_a_pose_that_closes_the_mouth_is_made_where_there_is_none(head, skin, fitted):
+    ways = head.ways | {"mouthClose": head.closed - head.ways["jawOpen"]}
+    out = repair(skin, head.faces, fitted, Corners(), None, ways, {})
+    assert list(out.combinations) == [("jawOpen", "mouthClose")]
+    assert out.report.rows["jawOpen+mouthClose"][1].lip_gap <= 0.3
+
+
+def test_what_works_only_together_with_others_is_an_expression_that_moves_nothing(head, mended):
+    assert list(mended.expressions) == [*head.ways, *TOGETHER]
+    assert not any(mended.expressions[name].any() for name in TOGETHER)
+
+
+def test_lips_that_are_far_apart_are_not_torn(head, skin):
+    bare = sort_parts([part("face", head.points, head.faces)])
+    jaw = head.ways["jawOpen"]  # and nothing closes the lips
+    out = repair(skin, head.faces, bare, Corners(), None, head.ways, {CLOSED: jaw})
+    assert np.array_equal(out.combinations[CLOSED], jaw)
+    assert "too far to be brought together: is the mouth open at rest?" in out.report.notes[-1]
+    assert bare.notes == out.report.notes
+
+
+def test_skin_that_is_pressed_into_teeth_comes_out(head, skin, fitted):
+    flat = type(fitted)(fitted.face, copy.deepcopy(fitted.of("teeth")))
+    for row in flat.rows:  # nearer to the lips
+        row.part.mesh.positions[:, 2] += 1.4
+    bodies = Bodies(flat, skin, head.ways)
+    contacts = Contacts(skin, head.faces, bodies)
+    near = np.hypot(skin.points[:, 0], skin.points[:, 1] - MOUTH) < 1.2
+    pressed = np.where(near[:, None], [0.0, 0.0, -0.45], 0.0)
+    before = contacts.volume(pressed, ())
+    assert before > 20
+    assert contacts.volume_by_checker(pressed, ()) > 20
+    out = contacts.pushed(pressed, ())
+    assert contacts.volume(out, ()) < 0.05 * before
+
+
+def test_teeth_of_the_jaw_go_with_it(head, skin, fitted):
+    bodies = Bodies(fitted, skin, head.ways | {"jawOpen": turned_jaw(skin)})
+    upper, lower = bodies.posed(("jawOpen",))
+    assert np.array_equal(upper, arch(MOUTH + 0.05, 1)[0])
+    assert lower[:, 1].max() < arch(MOUTH - 0.05, -1)[0][:, 1].max() - 0.5
+
+
+def turned_jaw(skin):
+    arm = skin.points - [0, 0, 0]
+    c, s = np.cos(0.3), np.sin(0.3)
+    turned = np.stack([arm[:, 0], c * arm[:, 1] - s * arm[:, 2], s * arm[:, 1] + c * arm[:, 2]], 1)
+    return np.where(skin.points[:, 1:2] < MOUTH, turned - arm, 0.0)
+
+
+def test_what_is_told_of_the_progress_can_stop_it(head, skin, fitted):
+    told = []
+
+    def tell(share):
+        told.append(share)
+        return len(told) < 2
+
+    with pytest.raises(Stopped):
+        repair(skin, head.faces, fitted, Corners(), None, head.ways, {}, tell)
+    assert told == sorted(told)
+
+
+def test_a_face_without_eyes_and_lips_stays_as_it_is(head, skin):
+    bare = sort_parts([part("face", head.points, head.faces)])
+    ways = {"browDownL": np.where(skin.points[:, 1:2] > 4, [0.0, -0.2, 0.0], 0.0)}
+    out = repair(skin, head.faces, bare, None, None, ways, {})
+    assert np.array_equal(out.expressions["browDownL"], ways["browDownL"])
+    assert out.report.rows == {}
