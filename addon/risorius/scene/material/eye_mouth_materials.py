@@ -10,8 +10,9 @@ from ..base.blender_types import Socket
 from .look import Look
 from .nodes import Color, Graph, Value
 
-# Mesh attributes. EYES: x and height from the eye's axis in radii, 1 on the front half; TEETH: place
-# along the arch, pi per tooth, and height, -1 to 1; MOUTH: depth behind the front in eye distances.
+# Mesh attributes. EYES: x and height from the eye's axis in radii, 1 on the front half; TEETH:
+# place along the arch, pi per tooth, and height, -1 to 1; MOUTH: depth behind the foremost vertex
+# in eye distances.
 EYES = "risorius_eye"
 TEETH = "risorius_teeth"
 MOUTH = "risorius_mouth"

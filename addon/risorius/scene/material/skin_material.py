@@ -27,7 +27,7 @@ _PITCH = {"level": 19.0, "upright": 24.0, "rays": 20.0, "arc": 6.0}
 _FLUSH_SHARE = 0.22  # factor of blushes without a painted mask, which must stay faint
 _PORE_DEPTH = 0.032
 _GRAIN_DEPTH = 0.006
-# Range of light in light skin, in eye distances, and the smallest factor of this range in dark skin.
+# Range of light in light skin, in eye distances; smallest factor of this range in dark skin.
 _SUBSURFACE, _DARKEST = 0.026, 0.4
 _RADIUS = (1.0, 0.36, 0.2)
 _IOR = 1.4
