@@ -253,7 +253,8 @@ def _turn_of(live: runtime.Runtime, joint: int, turns: Mapping[str, Quaternion])
 
 
 def _unturned(live: runtime.Runtime, point: Float, turns: Mapping[str, Quaternion]) -> Float:
-    """Maps a point from the armature's axes, with neck and head turned, to the unturned head."""
+    """Undoes the rotations of neck and head on a point that is fixed in the world, so that the
+    result fits the unturned head; both in the armature's axes."""
     head = live.anchors.head
     if head is None or not turns:
         return point

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Chooses what the eyes' target follows: the head, the world, or an object such as the camera."""
+"""Lets the eyes' target follow the head, the world, or an object such as the camera."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Blink:
         """Frames and values of the keys of one eye.
 
         Args:
-            begin: start of closing.
+            begin: frame at which the eye begins to close.
             before, after: slider values at the start and end of the blink.
         """
         shut = begin + self.close

@@ -52,7 +52,7 @@ class Settings:
 
 @dataclass
 class Session:
-    """A character that follows a subject.
+    """The live capture of a character that follows a subject, such as the face on a phone.
 
     Attributes:
         uid, name: session uid and last name of the control armature.

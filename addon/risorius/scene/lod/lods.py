@@ -94,8 +94,8 @@ def follow_camera(rig: ArmatureObject, enable: bool, size: float | None = None) 
 
 
 def expected(rig: ArmatureObject, rendering: bool, last: int | None) -> int:
-    """The probable level of a frame that is not evaluated yet, so that the camera distance is
-    unknown.
+    """The probable level of a frame whose camera distance is unknown because the frame is not
+    evaluated yet.
 
     Args:
         rig: the deforming armature.

@@ -31,8 +31,8 @@ COLOR_SPACES = (
 DATA_SPACES = ("Non-Color", "Raw", "Utility - Raw", "raw", "Generic Data", "Non-Colour Data")
 PACK_LIMIT = 64 << 20  # bytes; larger files are not packed, or a .blend would grow to gigabytes
 # In memory an image may take _ONE_IMAGE bytes + _MOST_TIMES its file size, all images of an import
-# _ALL_IMAGES bytes + _MOST_TIMES the size of their files. So a picture of 8192 x 8192 pixels is
-# accepted if it has one colour and a tiny file.
+# _ALL_IMAGES bytes + _MOST_TIMES the size of their files. So 8192 x 8192 pixels of 4 bytes are
+# accepted even if the file is tiny because the picture has one colour.
 _ONE_IMAGE, _ALL_IMAGES, _MOST_TIMES = 256 << 20, 1 << 30, 64
 TILE = 512  # pixels, side of one tile of the mask atlas
 

@@ -44,7 +44,7 @@ def build_materials(
     found: texture_search.TexturePlan | None = None,
     simple: bool = False,
 ) -> list[str]:
-    """Build the materials of a character, one per mesh base, and put them on its meshes.
+    """Build the materials of a character, one per mesh name without LOD, and assign them.
 
     Args:
         plan: the CharacterPlan.
@@ -52,7 +52,7 @@ def build_materials(
         built: mesh objects, in the order of the plan's meshes.
         made: receives every new datablock.
         found: texture_search.TexturePlan; None for no textures.
-        simple: build the cheap variant: no subsurface, relief or maps.
+        simple: True builds cheaper materials without subsurface scattering, relief and maps.
 
     Returns:
         Sentences about textures that are missing, cannot be read or stay outside the .blend.
@@ -116,7 +116,7 @@ def _look(
 def _build(
     plan: plans.CharacterPlan, look: Look, made: list[bpy.types.ID]
 ) -> list[bpy.types.Material]:
-    """Build the materials of a mesh base, in the order of their slots."""
+    """Build the materials of one mesh name without LOD, in the order of their slots."""
     material = bpy.data.materials.new(f"{plan.name}_{look.base}")
     made.append(material)
     material.diffuse_color = _VIEW_COLORS[look.kind]

@@ -34,7 +34,7 @@ class MixError(FaceError, ValueError):
 
 
 def region_names() -> tuple[str, ...]:
-    """The names of the regions that can be mixed with other shares."""
+    """The names of the regions of a face that can be mixed with shares of their own."""
     return tuple(native.part("mixing").REGIONS)
 
 

@@ -16,7 +16,7 @@ from ..base.blender_types import ArmatureObject
 from . import displacement, present
 
 Poses = tuple[NDArray[np.float32], NDArray[np.float32]]  # joint deltas, channel weights
-_LEAST = 1e-3  # millimetres; less is rounding of float32, 1.7 m above the origin
+_LEAST = 1e-3  # millimetres; less is float32 rounding of a head 1.7 m above the origin
 _MOST_FIRING = 24  # correctives whose motion is computed: those with the largest values
 # Deforming armature -> its last result.
 _found: dict[int, Found] = session.table("causes.found", ("undo", "load"))
@@ -139,7 +139,7 @@ def last(rig: ArmatureObject) -> Found | None:
 
 
 def firing(now: present.Present) -> list[int]:
-    """Indices of firing correctives, network outputs and poses, the largest values first.
+    """Indices of firing (not 0) correctives, network outputs and poses, largest values first.
 
     Args:
         now: the current face.

@@ -34,7 +34,7 @@ from ..character import runtime
 from . import causes, displacement, heat_views, layer_share, present
 
 KINDS = ("CONTROL", "POSE", "CORRECTIVE", "LAYER")
-_LEAST = 0.01  # smallest millimetres of the hottest colour, so that noise stays cold
+_LEAST = 0.01  # lower limit of the millimetres of the hottest colour, so that noise looks cold
 # Deforming armature -> inputs of its colours.
 _shown: dict[int, object] = session.table("heat.shown", ("undo", "load"))
 # Deforming armature -> its map while a file is saved.
@@ -241,7 +241,7 @@ def follow_undo() -> None:
 
 
 def refresh(rig: ArmatureObject, depsgraph: Depsgraph) -> bool:
-    """Update the colours of a character if its pose has changed. Returns: whether it did.
+    """Update the colours of a character if its pose has changed. Returns: whether it has changed.
 
     Args:
         rig: its deforming armature, with a heat map.

@@ -237,5 +237,5 @@ def weights_of(value: str) -> Mapping[str, float]:
 
 
 def is_editable(item: bpy.types.Object) -> bool:
-    """Whether assignments can be stored on a mesh, which is not linked from another file."""
+    """Whether assignments can be stored on a mesh; False if it is linked from another file."""
     return item.data is not None and item.data.is_editable

@@ -93,7 +93,7 @@ class Job:
 
 # Deforming armature -> the plan to whose modes its meshes were last switched.
 _settled: dict[int, conditions.Plan] = session.table("direct.settled", ("rewrite", "undo", "load"))
-# Deforming armature -> the last written Frame; compiled data of the face.
+# Deforming armature -> its last written Frame, and (second table) the compiled data of its face.
 _shown: dict[int, Frame] = session.table("direct.shown", ("undo", "load"))
 _faces: dict[int, _Face] = session.table("direct.faces", ("rewrite", "undo", "load"))
 
@@ -111,7 +111,7 @@ def settle(rig: ArmatureObject, plan: conditions.Plan) -> bool:
         plan: plan of the face.
 
     Returns:
-        Whether a mesh changed its mode, so that its last written values no longer apply.
+        Whether a mesh changed its mode, so that its last written values are outdated.
     """
     if _settled.get(rig.session_uid) is plan:
         return False

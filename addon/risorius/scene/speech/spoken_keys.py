@@ -27,7 +27,7 @@ from ..base import compat, parts
 PROPERTY = "risorius_spoken"
 _NEAR = TOLERANCE  # smaller changes of a control's value are ignored
 _REACH = 1.2  # seconds before and after a sound in which it can move the mouth
-_ROUND = 2.5  # seconds before and after some samples whose sounds are evaluated for them
+_ROUND = 2.5  # seconds: sounds up to this far from the computed samples are included
 _BESIDE = 1e-3  # frames: keys closer than this are at the same frame
 
 Floats = NDArray[np.float64]

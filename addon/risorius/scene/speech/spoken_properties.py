@@ -2,7 +2,7 @@
 """The words and sounds of a voice as properties of its action, so that they are saved, appended,
 copied and undone with the action."""
 
-# Blender defines properties by annotations that are no types:
+# Blender properties are declared as annotations that are not types:
 # pyright: reportInvalidTypeForm=false
 
 import bpy

@@ -228,7 +228,7 @@ def _differ(one: Matrix, other: Matrix) -> bool:
 
 
 def _keep_in_place(child: bpy.types.Object, moved: _Moved) -> None:
-    """Restore the place of a child of a part, because Blender does not keep it under all bones."""
+    """Restore the place of a child of a part; Blender does so itself, but not under all bones."""
     before = _noted.get(child.session_uid)
     if before is not None and before.parent == moved.item.session_uid:
         child.matrix_parent_inverse, child.matrix_basis = before.hung, before.own

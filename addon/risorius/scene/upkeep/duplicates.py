@@ -28,7 +28,7 @@ def separate_all() -> list[str]:
 
 
 def separate(rig: ArmatureObject) -> list[str]:
-    """Make the shared data of a character its own.
+    """Give a character its own copies of shared data, and let drivers read its own properties.
 
     Args:
         rig: its deforming armature.

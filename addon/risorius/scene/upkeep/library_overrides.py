@@ -123,8 +123,8 @@ def is_locked(item: MeshObject) -> bool:
 
 
 def unlock_shapes(rig: ArmatureObject) -> bool:
-    """Copy all meshes whose shapes are locked into this file, before their mode is switched.
-    Returns whether there were any."""
+    """Copy all meshes whose shapes belong to another file into this file, so that their mode can be
+    switched. Returns whether there were any."""
     owned = {}
     locked = [item for item in parts.meshes_of(rig) if is_locked(item)]
     for item in locked:

@@ -88,7 +88,7 @@ def _sliders(rig: ArmatureObject) -> list[str]:
 
 
 def missing(item: bpy.types.Object | None) -> list[str]:
-    """The lost parts of an object's character.
+    """Describe the lost parts of an object's character.
 
     Args:
         item: any object, or None.
