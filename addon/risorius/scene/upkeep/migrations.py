@@ -47,7 +47,7 @@ def _bring_up(rig: ArmatureObject, controls: ArmatureObject) -> list[str]:
         reached += 1
     if reached > found:
         if form.VERSION in controls:
-            del controls[form.VERSION]  # a value of another type cannot be overwritten
+            del controls[form.VERSION]  # the stored value may not be a number
         # For an override of an older library the number is lost when the file is saved, so it is
         # updated again.
         controls[form.VERSION] = reached
