@@ -2,7 +2,7 @@
 """Rebuilt joint groups: the same function, without small values of other regions.
 
 The joint groups of a file are read independently from the format: a dense matrix for each LOD, in
-    which the last writer of a row wins.
+which the last writer of a row wins.
 """
 
 import copy

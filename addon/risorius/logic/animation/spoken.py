@@ -2,7 +2,7 @@
 """The sounds of a voice as a list, and corrections; each correction returns a new list.
 
 Sounds follow each other without gaps: each lasts until the next one begins. So corrections make no
-    gaps and no overlaps.
+gaps and no overlaps.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 
 Blender: z up, a face looks along -y, its left is +x, right-handed, metres / scene unit scale.
 Column vectors: v' = scale * axes @ v. A rotation M becomes axes @ M @ axes^T, which is a rotation
-    also if `axes` mirrors.
+also if `axes` mirrors.
 """
 
 from __future__ import annotations

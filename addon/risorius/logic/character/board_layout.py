@@ -2,8 +2,8 @@
 """Places of the handles of a face board, and the lines drawn around them.
 
 Lengths are in units of the board: moving a handle by 1 changes its GUI control by 1. The board is
-    seen from the front, x to the viewer's right, y up; the character's left is on the right.
-    Handles with known names lie as on a face; all others lie in rows by region.
+seen from the front, x to the viewer's right, y up; the character's left is on the right. Handles
+with known names lie as on a face; all others lie in rows by region.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A checker treats members of this Context as present; Blender's own may be None: pyright:
-# reportIncompatibleMethodOverride=false
+# A checker treats members of this Context as present; Blender's own may be None:
+# pyright: reportIncompatibleMethodOverride=false
 """Types for annotations that are more exact than Blender's own.
 
 An Object type for each kind of data: Blender's class may have data of any kind. In the stubs of
-    Blender's API a context may lack a scene or a window manager. It has both while an operator runs
-    or a panel is drawn, so code need not test it each time. At run time all classes here are
-    Blender's own. Any is used here because a base class lacks the members of its kinds. No other
-    file of the add-on may use Any in a signature.
+Blender's API a context may lack a scene or a window manager. It has both while an operator runs or
+a panel is drawn, so code need not test it each time. At run time all classes here are Blender's
+own. Any is used here because a base class lacks the members of its kinds. No other file of the
+add-on may use Any in a signature.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 """Control armatures evaluated alone, in a scene of data of its own.
 
 This scene is in no file: no list, save, undo step, append or handler finds it. The armatures are
-    cameras of its markers: Blender evaluates these and counts no user. Blender finds the objects
-    that move them by itself.
+cameras of its markers: Blender evaluates these and counts no user. Blender finds the objects that
+move them by itself.
 """
 
 from __future__ import annotations

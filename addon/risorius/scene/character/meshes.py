@@ -117,8 +117,7 @@ def real_channels(item: MeshObject) -> dict[str, int]:
     """Shape key name -> channel, for the real keys that Risorius made; their drivers identify them.
 
     A key that the user drives by a channel belongs to the user: the name of the driver's variable
-        differs. If a driver was copied onto another key, the first key of the list belongs to
-        Risorius.
+    differs. If a driver was copied onto another key, the first key of the list belongs to Risorius.
     """
     key = item.data.shape_keys
     driven: dict[str, int] = {}

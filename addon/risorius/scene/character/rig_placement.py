@@ -196,7 +196,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
     """Rotations of a body's neck and head for the face, relative to the base bone.
 
     Copy constraints of bones are no alternative: they assume equal object rotations, and bodies
-        from other programs are rotated and scaled objects.
+    from other programs are rotated and scaled objects.
 
     Args:
         controls: the control armature, the original.

@@ -21,9 +21,9 @@ def show(controls: ArmatureObject, paths: Iterable[str]) -> None:
     """Make new keys of a face visible in the animation editors.
 
     The bone with the sliders is selected: it is locked, so nobody moves it by accident. Outside
-        pose mode the bones of head and eyes are selected too, so that moving a column of keys moves
-        their keys. In pose mode they are selected only if none of the keyed bones is selected.
-        Handles of a face board follow this rule in every mode.
+    pose mode the bones of head and eyes are selected too, so that moving a column of keys moves
+    their keys. In pose mode they are selected only if none of the keyed bones is selected. Handles
+    of a face board follow this rule in every mode.
 
     Args:
         controls: control armature of the face.

@@ -277,7 +277,7 @@ def _restored(*_arguments: object) -> None:
     """After load, undo and redo: forget the last written values, which no longer apply.
 
     Nothing is read here: until the next update, pose bones of restored objects point to freed
-        bones, and reading them crashes Blender.
+    bones, and reading them crashes Blender.
     """
     session.end("undo")
     joint_readings.note_edit()

@@ -2,8 +2,8 @@
 """The controls of a frame before Blender evaluates it.
 
 Blender evaluates a frame in one go, simulations too, and calls its handlers afterwards: values
-    written by handlers come too late for cloth and hair. So Risorius evaluates the control
-    armatures first in a separate graph, and the face has its pose when the frame begins.
+written by handlers come too late for cloth and hair. So Risorius evaluates the control armatures
+first in a separate graph, and the face has its pose when the frame begins.
 
 The scene of that graph is in no file, see `stage`.
 """
