@@ -124,6 +124,12 @@ class Reader(ast.NodeVisitor):
                 if isinstance(row, ast.Tuple) and len(row.elts) == 3:  # whatever its case
                     self.add(row.elts[1], "Risorius")
                     self.add(row.elts[2], "*")
+        elif name in ("_choice", "_allowed"):  # of the licence: a name and items
+            self.add(node.args[0], "Risorius")
+            for row in node.args[1:]:
+                if isinstance(row, ast.Tuple) and len(row.elts) == 3:
+                    self.add(row.elts[1], "Risorius")
+                    self.add(row.elts[2], "*")
         elif name == "pgettext_tip":
             self.add(node.args[0], "*")
         elif name in SENTENCES and owner in ("", "words"):
