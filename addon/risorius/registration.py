@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import bpy
 
 from . import native
-from .language import tables
+from .language import errors, tables
 from .scene.animation import layer_properties, range_properties
 from .scene.base import compat, console, session
 from .scene.events import handlers
@@ -89,7 +89,10 @@ session.adopt(
     native.website,
     native.regions,
     native.live_sources,
+    errors.best,
+    errors.rows,
     tables.controls,
+    tables.error_rows,
     tables.languages,
     tables.search_words,
     tables.translation,

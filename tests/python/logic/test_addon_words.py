@@ -81,6 +81,13 @@ class Reader(ast.NodeVisitor):
         elif isinstance(node, ast.JoinedStr) and only_plain:
             self.hidden.append(f"{self.path.name}:{node.lineno}")
 
+    def add_items(self, rows: Sequence[ast.expr]) -> None:
+        """The names and descriptions of an enumeration, whatever the case of its identifiers."""
+        for row in rows:
+            if isinstance(row, ast.Tuple) and len(row.elts) == 3:
+                self.add(row.elts[1], "Risorius")
+                self.add(row.elts[2], "*")
+
     def visit_ClassDef(self, node: ast.ClassDef) -> None:
         bases = {ast.unparse(base).rpartition(".")[2] for base in node.bases}
         if bases & set(CLASSES) and not self.only:
@@ -120,10 +127,10 @@ class Reader(ast.NodeVisitor):
         if name.endswith("Property") or name == "_still":
             self.add(words.get("name"), "Risorius")
             self.add(words.get("description"), "*")
-            for row in getattr(words.get("items"), "elts", ()):
-                if isinstance(row, ast.Tuple) and len(row.elts) == 3:  # whatever its case
-                    self.add(row.elts[1], "Risorius")
-                    self.add(row.elts[2], "*")
+            self.add_items(getattr(words.get("items"), "elts", ()))
+        elif name in ("_choice", "_allowed"):  # of the licence: a name and items
+            self.add(node.args[0], "Risorius")
+            self.add_items(node.args[1:])
         elif name == "pgettext_tip":
             self.add(node.args[0], "*")
         elif name in SENTENCES and owner in ("", "words"):
