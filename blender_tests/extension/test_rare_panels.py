@@ -19,7 +19,7 @@ def rig(dna_file):
 def test_without_a_face_the_panel_offers_one():
     layout = drawn(bpy.types.RISORIUS_PT_character)
     assert layout.operators == [
-        *("risorius.add_character", "risorius.import_dna"),
+        *("risorius.add_character", "risorius.import_dna", "risorius.make_rig_from_head"),
         "risorius.key",
         *("risorius.import_animation", "risorius.speak"),
     ]

@@ -146,7 +146,7 @@ class RISORIUS_OT_paste_pose(HandOperator, Operator):
         """The tooltip. Args: context  of the button, properties  as it gives them."""
         text = "Paste the copied sliders"
         if getattr(properties, "flipped", False):
-            text = "Paste the copied sliders with left and right swapped"
+            text = "Paste the copied sliders, swapped left for right"
         return bpy.app.translations.pgettext_tip(text) or text
 
     def move(self, context: Context) -> Collection[str]:
