@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Plans to Blender objects, poses to Blender objects."""
+"""Builds the Blender objects of a character, sets their poses and animates them."""

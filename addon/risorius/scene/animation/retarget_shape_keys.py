@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Shape-key animation of another rig as a clip of its own names, to be mapped to a face."""
+"""Reads the shape-key animation of another rig as a clip, which is then mapped to a face."""
 
 from __future__ import annotations
 
@@ -48,20 +48,20 @@ def clip_of(
     first: float | None = None,
     last: float | None = None,
 ) -> native.Clip:
-    """The shape keys of an object over time.
+    """The animation of an object's shape keys as a clip.
 
     A single action is read directly. NLA strips and drivers are evaluated frame by frame.
 
     Args:
         context: scene and view layer.
         item: a mesh object.
-        first, last: frames; None: the range of its action, or of the scene.
+        first, last: frames; None: from the range of its action, or of the scene.
 
     Returns:
-        risorius.Clip, one curve for each shape key that moves or is not 0; frame 0 is second 0.
+        A clip with one curve for each shape key that moves or is not 0; frame 0 is second 0.
 
     Raises:
-        ClipError: no shape key moves.
+        ClipError: all shape keys are 0 at all frames.
     """
     keys = parts.keys_there(item)
     data = keys.animation_data
