@@ -49,7 +49,7 @@ CHANNEL_VARIABLE = "risorius_channel"  # driver variable that identifies keys of
 TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
-LOOK = "risorius_look"  # on the deforming armature: shown stages of the face, see look_masks.py
+LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
 HEAT = "risorius_heat"  # on the deforming armature: its heat map; on meshes: the colour attribute
 HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: the colours active before
 BAKED = "risorius_baked"  # on rig or controls: notes of a bake; a baked rig is not live
