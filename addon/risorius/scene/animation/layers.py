@@ -37,8 +37,7 @@ def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[R
 
 
 def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
-    """The layers of a face without removed ones, bottom to top. Args: controls  control armature.
-    """
+    """The layers of a face without removed ones, bottom to top. Args: controls  control armature."""
     return [layer for _place, layer in ordered(controls)]
 
 

@@ -20,9 +20,7 @@ Node = Any  # a shader or compositor node; each kind has different settings
 Attribute = Any  # an attribute of a mesh; each type has different data
 NodeTree = Any  # the node tree of a material, a scene or a group
 Socket = Any  # a node socket; the type of default_value depends on its kind
-Values = NDArray[
-    Any
-]  # values of a mesh attribute: one row for each vertex, corner or face
+Values = NDArray[Any]  # values of a mesh attribute: one row for each vertex, corner or face
 Override = dict[str, Any]  # keyword arguments of bpy.context.temp_override
 Animated = bpy.types.Object | bpy.types.Key  # datablocks of a face that play actions
 

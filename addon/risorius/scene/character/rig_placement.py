@@ -173,8 +173,7 @@ def attach(
 
 
 def _neck_chain(body: ArmatureObject, base: str, neck: str, head: str) -> list[str]:
-    """The body's bones from the neck bone to the head's parent, because a neck may have several.
-    """
+    """The body's bones from the neck bone to the head's parent, because a neck may have several."""
     if not neck:
         return []
     bone = body.data.bones.get(head)
