@@ -45,7 +45,7 @@ def _changed(self: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None
 def _still(
     kind: Callable[..., Any], options: Iterable[str] = frozenset(), **given: object
 ) -> object:
-    """A property that cannot be animated. Args: kind  function of bpy.props, given  its arguments."""
+    """A property without animation. Args: kind  function of bpy.props, given  its arguments."""
     return kind(options=set(options), override=_OVERRIDE, update=_changed, **given)
 
 

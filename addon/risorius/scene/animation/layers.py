@@ -37,7 +37,7 @@ def places(controls: bpy.types.Object) -> bpy.types.bpy_prop_collection_idprop[R
 
 
 def of(controls: bpy.types.Object) -> list[RISORIUS_PG_layer]:
-    """The layers of a face without removed ones, bottom to top. Args: controls  control armature."""
+    """The layers that are not removed, bottom to top. Args: controls  the control armature."""
     return [layer for _place, layer in ordered(controls)]
 
 
@@ -105,7 +105,7 @@ def fits(controls: ArmatureObject, action: bpy.types.Action) -> bool:
 
 
 def add_warp_point(layer: RISORIUS_PG_layer, frame: float) -> None:
-    """Add a warp point that pins the source frame shown at a scene frame to this scene frame.
+    """Add a warp point to a layer that pins the source frame shown at a scene frame to this frame.
 
     The first warp point also adds one at each end, so that all frames keep their timing.
     """

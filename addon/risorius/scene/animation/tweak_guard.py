@@ -104,7 +104,7 @@ def begin(controls: ArmatureObject, first: float, last: float, fade: float) -> N
 
 
 def end(controls: ArmatureObject) -> None:
-    """Store the controls moved at the current frame in the tweak, and turn it off. Its layer stays."""
+    """Store moves without a key in the tweak, and turn the tweak off. Its layer stays."""
     settle(controls)
     tweaks.end(controls)
     _drop(controls)
@@ -335,7 +335,7 @@ def _curves(controls: ArmatureObject, action: bpy.types.Action) -> Curves:
 def _inserted(
     curve: bpy.types.FCurve, before: bpy.types.FCurve | None, frame: float
 ) -> list[float] | None:
-    """The frames of keys that were inserted after `before`; None if the curve was edited otherwise."""
+    """The frames of keys that `before` lacks; None if the curve has any other edit."""
     frames, values = clip_actions.key_points(curve)
     if before is None:
         return frames.tolist()

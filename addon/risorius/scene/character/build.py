@@ -213,7 +213,7 @@ def _source(path: Path) -> str:
 def _find_textures(
     plan: plans.CharacterPlan, path: Path, options: BuildOptions
 ) -> texture_search.TexturePlan:
-    """The textures near the file and in the chosen folder; empty if the options exclude textures."""
+    """The textures near the file and in the chosen folder; none if `options.textures` is off."""
     if not options.textures:
         return texture_search.TexturePlan()
     chosen = bpy.path.abspath(options.texture_folder) if options.texture_folder else ""

@@ -356,7 +356,7 @@ def _to_live(
 
 
 def add_live_key(item: MeshObject) -> None:
-    """Add the live key, which holds the sum of channels or final positions. Args: item  the mesh."""
+    """Add the live key, for the sum of channels or final positions. Args: item  the mesh object."""
     if item.data.shape_keys is None:
         item.shape_key_add(name="Basis", from_mix=False)
     block = item.shape_key_add(name=LIVE_KEY, from_mix=False)

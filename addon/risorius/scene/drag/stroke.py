@@ -223,7 +223,7 @@ class Stroke:
     def _solve(
         self, target: Float, view: Float | None, free: NDArray[np.bool_]
     ) -> tuple[NDArray[np.float32], Float]:
-        """Returns: float32[R] solved raw controls, and the predicted world position of the point."""
+        """Returns: float32[R] solved raw controls, and the predicted world position float64[3]."""
         anchors = self._of()
         goal, axes = self._goal(anchors, target, view)
         near = self.options.method == "near"

@@ -104,7 +104,7 @@ def _render_ended(*_arguments: object) -> None:
 
 @persistent
 def _updated(scene: bpy.types.Scene, depsgraph: Depsgraph) -> None:
-    """React to edits. The writes tag only rigs and not controls, so they cause no endless updates."""
+    """React to edits. The writes tag rigs but not controls, so that updates do not repeat."""
     controls_ahead.note_evaluated(scene)
     controls_ahead.note_edit()
     joint_readings.note_edit()

@@ -274,7 +274,7 @@ def _forget(item: bpy.types.Object) -> None:
 
 
 def _everything() -> dict[str, set[bpy.types.ID]]:
-    """Every datablock of the file by name of its collection in bpy.data; shape keys are left out."""
+    """Collection in bpy.data -> its datablocks; shape keys are left out."""
     return {
         kind.identifier: set(getattr(bpy.data, kind.identifier))
         for kind in bpy.data.bl_rna.properties

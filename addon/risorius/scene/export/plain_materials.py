@@ -206,7 +206,7 @@ def _shown_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer | None:
 
 
 def _write(mesh: bpy.types.Mesh, corners: NDArray[np.int64], part: NDArray[np.float32]) -> None:
-    """Write UV coordinates of some corners into the bake layer, made as a copy of the shown layer."""
+    """Write UV coordinates of some corners into the bake layer, a copy of the shown layer."""
     shown, layer = _shown_layer(mesh), mesh.uv_layers.get(_LAYER)
     values = np.zeros(len(mesh.loops) * 2, np.float32)
     begins = layer or shown

@@ -200,7 +200,7 @@ def _posed(
 
 
 def _frame(sitter: Sitter) -> tuple[Floats, float]:
-    """The centre of the picture in Blender's axes and half its height, so that the face fills it."""
+    """The centre of the picture in Blender's axes, and half its height, to frame the face."""
     live = sitter.live
     eyes = [live.rest[joint][:3, 3] for joint in live.anchors.eyes.values()]
     if len(eyes) == 2:

@@ -218,7 +218,7 @@ class _Job:
             target.vertex_indices, target.deltas = indices, deltas
 
     def weights(self, item: MeshObject, mesh_plan: plans.MeshPlan, labels: Sequence[str]) -> None:
-        """Write the skin weights of vertices that the user painted; other weights keep their bits."""
+        """Write skin weights of vertices that the user painted; other weights keep their bits."""
         present = skin_weights.read(item)
         painted = skin_weights.edited_vertices(present, skin_weights.file_pairs(mesh_plan, labels))
         ours = {name: joint for joint, name in reversed(list(enumerate(labels)))}

@@ -247,7 +247,7 @@ def _back_up(
 
 
 def _leave(change: Change, item: MeshObject, old: plans.MeshPlan | None) -> None:
-    """Remove a mesh that the new file lacks; with edits or additions by the user, hide it instead."""
+    """Remove a mesh that the new file lacks, or hide it if the user edited or extended it."""
     label = item.name
     known = old is not None and len(item.data.vertices) == len(old.positions)
     things = ["its unknown origin"]

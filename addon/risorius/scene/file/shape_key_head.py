@@ -34,7 +34,7 @@ def usable_head(item: bpy.types.Object | None) -> bool:
 
 
 def head_of(context: Context) -> MeshObject | None:
-    """The active object if it is usable as a head, else the first usable selected object, or None."""
+    """The active object if it is a usable head, else the first usable selected object, or None."""
     there = [context.active_object, *context.selected_objects]
     return next((cast(MeshObject, item) for item in there if usable_head(item)), None)
 
