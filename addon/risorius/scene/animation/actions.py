@@ -150,7 +150,7 @@ def _reduced(
 def _new_curve(bag: bpy.types.ActionChannelbag, track: Track, index: int) -> bpy.types.FCurve:
     rna: Any = bag.fcurves.bl_rna
     words = rna.functions["new"].parameters.keys()
-    for word in ("action_group", "group_name"):  # Blender up to 4.3; Blender since 5.0
+    for word in ("action_group", "group_name"):  # argument in Blender up to 4.3; since 5.0
         if word in words:
             return bag.fcurves.new(track.path, index=index, **{word: track.group})
     curve = bag.fcurves.new(track.path, index=index)
@@ -256,11 +256,11 @@ def keep(owner: Animated) -> None:
 
 
 def note_values(owner: Animated, paths: Iterable[str]) -> None:
-    """Store the values of properties that the baked action of `play` does not animate.
+    """Store the current values of properties that a baked action changes, for `restore`.
 
     Args:
-        owner: object that plays a baked action from now on.
-        paths: data paths that the baked action sets; only `restore` sets them back.
+        owner: object for which `play` was called.
+        paths: data paths of the properties.
     """
     lines = []
     for path in paths:

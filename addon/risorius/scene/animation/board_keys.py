@@ -29,8 +29,8 @@ class Converted:
     """Result of a conversion between sliders and board.
 
     Attributes:
-        loss: largest loss of raw controls over the pose and all frames.
-        kept: the earlier action, which nothing plays now; None if no action was converted.
+        loss: largest difference of raw controls by the conversion, over the pose and all frames.
+        kept: the unconverted action, kept with a fake user; None if no action was converted.
         curves: number of new F-curves.
         idle: names of other actions of the face whose keys have no effect after the switch.
     """
@@ -42,7 +42,7 @@ class Converted:
 
 
 def lost(loss: board_fit.Loss) -> Sentence | None:
-    """A sentence about the loss of a conversion; None if the loss is invisible.
+    """A sentence about the loss of a conversion; None if it is at most board.SEEN.
 
     Args:
         loss: differences of raw controls after a fit.

@@ -69,7 +69,7 @@ def colour_curve(curve: bpy.types.FCurve, label: str, step: int | None = None) -
     Args:
         curve: of a slider, in its group.
         label: name of the slider.
-        step: number of the shade, see colour_of; None: the number of curves in its group.
+        step: number of the shade, see colour_of; None: from the number of curves in the group.
     """
     region = native.regions().of_slider(label)
     group = curve.group

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The layers of a character as properties of its control armature: saved, copied and overridden."""
 
-# Blender takes properties where Python has annotations:
+# Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
 
 from collections.abc import Callable, Iterable

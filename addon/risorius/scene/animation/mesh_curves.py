@@ -27,7 +27,7 @@ Floats = NDArray[np.float32]
 
 
 def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
-    """Mesh objects of the scene that have the vertex count of a face mesh but belong elsewhere.
+    """Mesh objects of the scene with the vertex count of a face mesh that are no part of the face.
 
     Args:
         context: has the scene.
@@ -41,7 +41,7 @@ def sources(context: Context, rig: ArmatureObject) -> list[MeshObject]:
 
 
 def source_of(context: Context, rig: ArmatureObject) -> MeshObject | None:
-    """The mesh to read: the selected one, or the only one, or None.
+    """The mesh to read: a selected object of `sources`, else its only object, else None.
 
     Args:
         context: has the scene.
@@ -83,7 +83,7 @@ def recorded(
         context: scene and view layer.
         item: a mesh object; its modifiers are applied.
         first, last: first and last frame, both included.
-        progress: called with the finished share, 0 to 1.
+        progress: function that is called with the progress, 0 to 1.
 
     Raises:
         ClipError: the number of frames is outside 1 to MOST_FRAMES, or a modifier changes the

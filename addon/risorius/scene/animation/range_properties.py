@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The capture range of a face as properties of its control armature: saved, copied, overridden."""
 
-# Blender takes properties where Python has annotations:
+# Blender reads properties from annotations, which pyright does not accept as types:
 # pyright: reportInvalidTypeForm=false
 
 from typing import Any

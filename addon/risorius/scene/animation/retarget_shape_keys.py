@@ -25,7 +25,7 @@ def sources(context: Context) -> list[MeshObject]:
 
 
 def source_of(context: Context) -> MeshObject | None:
-    """The mesh to read: the selected one, or the only one of the scene, or None."""
+    """The mesh to read: a selected object of `sources`, else its only object, else None."""
     there = sources(context)
     selected = cast(list[MeshObject], context.selected_objects)
     chosen = [item for item in selected if item in there]

@@ -348,7 +348,7 @@ def _inserted(
         return None  # keys were moved, deleted or doubled
     changed = same & (np.abs(values - old_values[places]) > _NEAR)
     if same.all() and (changed & (np.abs(frames - frame) >= _AT)).any():
-        return None  # keys were moved up or down
+        return None  # the user edited values of existing keys
     return frames[~same | changed].tolist()
 
 

@@ -182,7 +182,7 @@ def shown(rig: ArmatureObject, level: int) -> list[MeshObject]:
 
     Args:
         rig: deforming armature of the character.
-        level: 0 is the finest.
+        level: level of detail; 0 is the finest.
     """
     return [m for m in parts.meshes_of(rig) if lods.shows(m, level)]
 

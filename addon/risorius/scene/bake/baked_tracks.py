@@ -202,7 +202,7 @@ def key_tracks(
         others: path -> values of keys that the user animates, see Samples.
 
     Returns:
-        One track for each shape key.
+        One track for each of these keys, and for each key in `others`.
     """
     tracks = list(_others(others or {}, key))
     for channel, name in names.items():

@@ -66,7 +66,8 @@ if TYPE_CHECKING:
     class Context(bpy.types.Context):
         """The context of an operator or a panel.
 
-        In the stubs a member named property turns all members above it into methods.
+        The members are declared again, because the stubs' Context has a member named `property`,
+        which pyright takes for the decorator of the other members.
         """
 
         region: bpy.types.Region | None  # pyright: ignore[reportIncompatibleVariableOverride]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Differences between Blender 4.2 and 5.2."""
+"""Functions that work alike in Blender 4.2 to 5.2."""
 
 from __future__ import annotations
 

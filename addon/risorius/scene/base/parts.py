@@ -15,9 +15,13 @@ CONTROLS = "risorius_controls"  # on the deforming armature: the control armatur
 DNA = "risorius_dna"  # on the deforming armature: the Text that holds the DNA file
 LOD = "risorius_lod"  # on the deforming armature: the level that the viewport shows
 LOD_RENDER = "risorius_lod_render"  # on the deforming armature: level in renders, -1: LOD
-LOD_BY_DISTANCE = "risorius_lod_by_distance"  # on it: whether camera distance chooses the level
-LOD_DISTANCES = "risorius_lod_distances"  # on it: entry n: distance of the change to level n + 1
-FOLLOW = "risorius_follow"  # on it: whether it copies the transform of the control armature
+LOD_BY_DISTANCE = (
+    "risorius_lod_by_distance"  # on the rig: whether camera distance chooses the level
+)
+LOD_DISTANCES = (
+    "risorius_lod_distances"  # on the rig: entry n: distance of the change to level n + 1
+)
+FOLLOW = "risorius_follow"  # on the rig: whether it copies the transform of the control armature
 UNIT = "risorius_unit"  # on the deforming armature: metres per Blender unit at import
 SOURCE = "risorius_source"  # on the deforming armature: path of the imported file
 TEXTURES = "risorius_textures"  # on the deforming armature: text about the textures found
@@ -26,7 +30,7 @@ RANGES = "risorius_ranges"  # on the control armature: capture range, see range_
 CURVES = "risorius_curves"  # on the control armature: unknown curves, see unknown_curves.py
 BODY_NECK = "risorius_body_neck"  # on the control armature: neck bones of the body, one per line
 BODY_HEAD = "risorius_body_head"  # on the control armature: head bone of the body
-MESH_PREFIX = "risorius_mesh_"  # + number, on the deforming armature: pointer to a mesh object
+MESH_PREFIX = "risorius_mesh_"  # prefix of numbered properties of the rig: pointers to its meshes
 MESH = "dna_mesh"  # on a mesh object: index of its mesh in the DNA file
 RESIDUAL = "risorius_residual"  # colour attribute: distance of solved curves from the source mesh
 LODS = "dna_lods"  # on a mesh object: the levels that show it
@@ -36,7 +40,7 @@ MODE = "risorius_mode"  # on a mesh object: LIVE or KEYS
 # On a mesh object in Direct mode (see direct.py): the persistent uid of the modifier.
 FINISHED = "risorius_finished"
 SKINNING = "risorius_skinning"  # on the deforming armature: "LIVE" forbids Direct mode
-JOINTS_SHOWN = "risorius_joints_shown"  # on it: an older file showed its joints
+JOINTS_SHOWN = "risorius_joints_shown"  # on the rig: an older file showed its joints
 VALUES = "risorius_values"  # on the deforming armature: the mesh that drivers read maps from
 NAMES = "risorius_names"  # on a Mesh: names that the user assigned to shape keys, see assigned.py
 LANDMARK = "risorius_landmark"  # on an empty: name of its head landmark, see points.py
@@ -50,7 +54,7 @@ TEST = (
     "risorius_test"  # on the deforming armature: a channel's test override, see channel_preview.py
 )
 LOOK = "risorius_look"  # on the deforming armature: solo and mute settings, see look_masks.py
-HEAT = "risorius_heat"  # on the deforming armature: its heat map; on meshes: the colour attribute
+HEAT = "risorius_heat"  # on the rig: kind of its heat map; on meshes: name of the colour attribute
 HEAT_BEFORE = "risorius_heat_before"  # on a Mesh with a heat map: the colours active before
 BAKED = "risorius_baked"  # on rig or controls: notes of a bake; a baked rig is not live
 MAPS = "maps"  # on the deforming armature: values of the animated maps
@@ -65,7 +69,7 @@ PULL = "risorius_pull"  # on the deforming armature: its driver keeps the contro
 PINS = "risorius_pins"  # on the control armature: flat list of mesh, vertex of each drag pin
 HANDLES_SELECTED = "risorius_handles_selected"  # a list like PINS: selected drag handles
 HANDLES_HIDDEN = "risorius_handles_hidden"  # a list like PINS: hidden drag handles
-_MOST_MESHES = 1 << 16  # the numbers of a DNA file have 16 bits
+_MOST_MESHES = 1 << 16  # mesh indices of a DNA file have 16 bits
 
 
 def rigs(linked: bool = False) -> list[ArmatureObject]:

@@ -40,7 +40,7 @@ def find(content: bytes, digest: str, data: bool) -> bpy.types.Image | None:
     Args:
         content: bytes of an image file.
         digest: storage.hash_of the content.
-        data: True: the colour space must be non-colour data; False: it must be a colour space.
+        data: True: find an image of non-colour data; False: an image of colours.
     """
     for image in bpy.data.images:
         if image.get(DIGEST) != digest or image.library is not None or _edited(image):

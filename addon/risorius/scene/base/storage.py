@@ -48,7 +48,7 @@ def store(name: str, content: bytes, made: list[bpy.types.ID]) -> bpy.types.Text
         return there
     text = bpy.data.texts.new(f"{name}.dna")
     made.append(text)
-    text.use_fake_user = False  # the armature's pointer keeps it
+    text.use_fake_user = False  # the armature's pointer keeps the Text in the file
     text.write(
         f"The DNA file of {name} ({len(content):,} bytes) is kept in this datablock.\n"
         "The character needs it; it is not meant to be edited.\n"

@@ -32,7 +32,7 @@ def follow(rig: ArmatureObject, seen: ArmatureObject) -> None:
     """
     if not _follows(rig):
         return
-    wanted = np.array(seen.matrix_world, np.float64)  # float32 in Blender 5
+    wanted = np.array(seen.matrix_world, np.float64)  # Blender 5 would give float32
     # Also write rounding differences, so that a frame does not depend on the frame before it.
     if last_written.is_new(last_written.places, rig, wanted.tobytes()) or not _is_at(rig, wanted):
         rig.matrix_basis = seen.matrix_world
@@ -203,7 +203,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
         depsgraph: the evaluated dependency graph.
 
     Returns:
-        "neck" and "head" -> Quaternion in the control armature's axes; rest rotations are left out.
+        "neck" and "head" -> Quaternion in the control armature's axes; missing without a rotation.
     """
     hold = body_of(controls)
     if hold is None:
@@ -228,7 +228,7 @@ def body_turns(controls: ArmatureObject, depsgraph: Depsgraph) -> dict[str, Quat
 
 
 def own_turn(seen: ArmatureObject, bone: bpy.types.PoseBone) -> Quaternion:
-    """A bone's own rotation after its constraints, in the axes of its armature.
+    """The rotation of a bone relative to rest and parent, with constraints, in the armature's axes.
 
     Args:
         seen: the evaluated armature.

@@ -103,7 +103,7 @@ class Runtime:
         return replace(self, board=PRIMARY)
 
     def with_board(self, kind: str) -> Runtime:
-        """The same compiled data with a kind of face board. Args: kind  PRIMARY or COMPLETE."""
+        """This Runtime for a kind of face board. Args: kind  PRIMARY or COMPLETE."""
         assert self.board == COMPLETE or kind == PRIMARY
         return self._with_primary if kind != self.board else self
 

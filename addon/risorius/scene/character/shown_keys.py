@@ -57,7 +57,7 @@ def show_some(controls: ArmatureObject) -> None:
 
 
 def show_object(context: Context, controls: ArmatureObject) -> None:
-    """Add the controls to the selection, in pose mode if the active object is in pose mode.
+    """Add the control armature to the selection; it enters pose mode if the active object is in it.
 
     Args:
         context: a Blender context.

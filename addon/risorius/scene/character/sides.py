@@ -101,7 +101,7 @@ def mirror(rig: ArmatureObject, region: str = "") -> None:
 
     Args:
         rig: the character.
-        region: name of the only region; "": all regions, and the control bones.
+        region: name of the region to mirror; "": all regions and the control bones.
     """
     put(rig, slider_rows.mirrored(values_of(rig, region), native.regions()))
     if not region:
@@ -132,7 +132,7 @@ def copy_across(rig: ArmatureObject, from_left: bool, region: str = "") -> int:
     Args:
         rig: the character.
         from_left: True: copy the character's left side to the right; False: right to left.
-        region: name of the only region; "": all regions.
+        region: name of the region to copy; "": all regions.
 
     Returns:
         The number of sliders that were set.

@@ -321,7 +321,7 @@ def _plan(
     moment: Moment,
     rendering: bool,
 ) -> conditions.Plan:
-    """The Plan (Direct mode or ordinary) of a face. Args: see evaluate; asked  the face's inputs."""
+    """The Plan (Direct or ordinary) of a face. Args: see evaluate; asked  inputs of the face."""
     if rendering:  # a change of mode during a render would rebuild Blender's graph
         return conditions.known(rig) or conditions.ORDINARY
     if moment is Moment.LOAD:
