@@ -139,7 +139,7 @@ class HeadTurns:
         name = self._names.get(joint)
         if name is None:
             return Matrix()
-        if self._posed is not None:  # natively, in Direct mode
+        if self._posed is not None:  # in Direct mode the native bones have the pose
             return Matrix([*self._posed[self._places[name]].tolist(), _LAST])
         return self._bones[name].matrix @ self._rests[name].matrix_local.inverted_safe()
 

@@ -99,7 +99,7 @@ class Stroke:
     skin: Skin
     state: sliders.Sliders
     turns: HeadTurns
-    reach: NDArray[np.float32]  # [3, R] what each control does to the point, file units
+    reach: NDArray[np.float32]
     raw: NDArray[np.float32]
     best: list[tuple[int, float, float]] = field(default_factory=list)
     _anchors: dict[bool, _Anchors] = field(default_factory=dict)

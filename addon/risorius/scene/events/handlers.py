@@ -307,7 +307,7 @@ def _before_save(*_arguments: object) -> None:
     if native.problem():
         return
     console.say(*duplicates.separate_all())
-    console.say(*migrations.bring_up_all())  # also faces whose migration waited for baked caches
+    console.say(*migrations.bring_up_all())  # retry migrations that waited for freed caches
     _end_tests()
     heat.take_away()
     if look_masks.take_away():
@@ -382,7 +382,7 @@ def _there() -> list[tuple[str, Any]]:
 
 
 def register() -> None:
-    """Add the handlers, and update the characters of the open file."""
+    """Add the handlers to Blender's lists."""
     for name, handler in _there():
         present = getattr(bpy.app.handlers, name)
         if handler not in present:
@@ -390,7 +390,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Remove the handlers, heat maps, and solo and mute settings."""
+    """Remove the handlers, heat maps, and solo and mute settings; faces leave Direct mode."""
     heat.end_all()
     if look_masks.take_away():
         refresh()

@@ -8,7 +8,7 @@ import zipfile
 from pathlib import Path
 
 _CRATE, _OGAWA = b"PXR-USDC", b"Ogawa"
-_SECTION = struct.Struct("<16sqq")  # of a crate's table of contents: name, first byte, bytes
+_SECTION = struct.Struct("<16sqq")  # section of a USD crate file: name, offset, size in bytes
 
 
 def is_cut(path: Path) -> bool:

@@ -39,7 +39,7 @@ def replace_file(
     path: str | Path,
     progress: Callable[[float], object] = lambda _share: None,
 ) -> list[str]:
-    """Replace a character's file by a DNA file.
+    """Replace the DNA file of a character by another DNA file.
 
     Args:
         context: a Blender context with scene and view layer.

@@ -309,7 +309,7 @@ def joint_rig(
     Args:
         dna: the face with blend shapes.
         wishes: options of the rig.
-        kept: prefixes of the names of meshes whose skin weights stay.
+        kept: parts of the names of meshes that keep their weights and blend shapes, see RigOptions.
         progress: function that is called with the progress, 0 to 1; it returns False to cancel.
     """
     author = native.part("author")

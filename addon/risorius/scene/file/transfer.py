@@ -56,9 +56,9 @@ class Nearest:
     """Transfer from the nearest point of the old surface to each new vertex.
 
     Args:
-        old: float64[V, 3] old neutral vertices.
-        triangles: int[T, 3] vertices of the old mesh's triangles.
-        new: float64[W, 3] new neutral vertices.
+        old: float64[V, 3], old neutral vertices.
+        triangles: int[T, 3], vertex indices of the old mesh's triangles.
+        new: float64[W, 3], new neutral vertices.
     """
 
     def __init__(

@@ -27,7 +27,7 @@ Face = tuple[ArmatureObject, ArmatureObject]  # deforming armature, control arma
 
 # Session uid of the user's scene -> temporary scene with its controls.
 _stages: dict[int, stage.Stage] = session.table("controls_ahead.stages", ("unregister",))
-# Whether the file was edited since the last frame, and whether it has a simulation.
+# Whether the file was edited since the last frame; whether the file has a simulation.
 _edited = session.value("controls_ahead.edited", True, ("undo", "load"))
 _simulated = session.value("controls_ahead.simulated", True, ("undo", "load"))
 # Session uids of scenes that Blender evaluated since the last load, undo or redo.
@@ -186,7 +186,7 @@ def _roots(faces: Iterable[Face]) -> list[bpy.types.Object]:
 
 
 def _faces_in(graph: Depsgraph, faces: Iterable[Face], whole: bool) -> bool:
-    """Whether a graph contains a rig of faces. Args: whole  True: look for their meshes too."""
+    """Whether a graph contains the rig of any face. Args: whole  True: or any mesh of a face."""
     return any(
         item.evaluated_get(graph).is_evaluated
         for rig, _controls in faces

@@ -106,7 +106,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     """Evaluate the characters of a scene before Blender evaluates the frame.
 
     Args:
-        scene: at its new time.
+        scene: the scene, with its new frame set.
         rendering: whether the frame is rendered.
     """
     if native.problem() or is_paused():
@@ -116,7 +116,7 @@ def before_frame(scene: bpy.types.Scene, rendering: bool) -> None:
     if not controls_ahead.is_needed() and not read:
         return
     found = [(rig, parts.controls_of(rig)) for rig in parts.rigs() if parts.BAKED not in rig]
-    members = set(scene.objects)  # users_scene would list them once for each face
+    members = set(scene.objects)  # read once; users_scene would search all scenes for each face
     faces = [(r, c) for r, c in found if c in members]
     if not faces or not controls_ahead.is_safe(scene):
         return
