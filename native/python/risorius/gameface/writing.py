@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Meshes, targets, joints and materials as the lists of one glTF file."""
+"""Writes meshes, morph targets, joints and materials into one glTF file."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .wishes import Wishes
 Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
-_STEPS = 32767  # whole numbers to each side of the middle of a quantized face
-_TURNED = 127.0
-_REACHES = 0.2  # metres: meshes that end so near to the feet stand on them
-_LEAST_TURN = 1e-3  # a change of a normal below a sixteenth of a degree is none
+_STEPS = 32767  # largest integer of a quantized coordinate
+_TURNED = 127.0  # largest integer of a quantized normal
+_REACHES = 0.2  # metres: meshes that end nearer than this to the toes have legs
+_LEAST_TURN = 1e-3  # smaller changes of a normal's components, about 0.06°, are set to 0
 
 
 class Change(NamedTuple):
-    """A morph target: its name, the group that it is counted with, float32[P, 3] in metres."""
+    """A morph target: its name, its group in the statistics, float32[P, 3] in metres."""
 
     name: str
     group: str
@@ -37,9 +37,11 @@ class Change(NamedTuple):
 
 @dataclass
 class Written:
-    """Attributes:
-    data: the file.
-    groups: group -> targets, vertices that they move, bytes.
+    """The written file and its statistics.
+
+    Attributes:
+    data: bytes of the file.
+    groups: group -> (number of targets, number of vertices that they move, bytes).
     """
 
     data: bytes
@@ -54,15 +56,15 @@ def write(
     wishes: Wishes,
     manner: vrm.Manner,
 ) -> Written:
-    """The file.
+    """Writes the glTF file.
 
     Args:
-        points: of the level.
-        skeleton: of the face, written where wished.
-        materials: of the face.
-        changes: the targets in the order in which meshes have them.
-        wishes: how lists are kept.
-        manner: of the face, for a VRM.
+        points: vertices of the LOD.
+        skeleton: joints of the face, written if wishes.skeleton is set.
+        materials: materials of the face.
+        changes: morph targets in the order of the file.
+        wishes: export options.
+        manner: measured VRM values of the face.
     """
     farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
     writer = _Writer(points, skeleton, materials, wishes, farthest)
@@ -92,7 +94,8 @@ class _Writer:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
         roots = [self._joints(nodes)] if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature; elsewhere nothing stands above a skin.
+        # TalkingHead looks for meshes below the armature; other clients expect skinned meshes at
+        # the root.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
@@ -128,7 +131,7 @@ class _Writer:
         head, eyes = own.places[own.head], [own.bones.get(f"{s}Eye") for s in ("left", "right")]
         known = [own.places[eye] for eye in eyes if eye is not None]
         avatar = vrm.Avatar(
-            own.bones,  # nodes of joints come first, so their numbers are those of the joints
+            own.bones,  # the nodes of the joints come first, so node numbers equal joint numbers
             (np.mean(known, axis=0) - head).tolist() if known else [0.0, 0.0, 0.0],
             shown,
             [c.name for c in changes if c.group not in ("vrm", "combinations")],
@@ -140,7 +143,7 @@ class _Writer:
         self.glb.uses(name, required=False)
 
     def _add_soles(self, below: list[int]) -> None:
-        """Two triangles of a millimetre where a body without meshes stands: TalkingHead lowers an
+        """Adds two triangles of 1 mm at the toes of a body without meshes: TalkingHead lowers an
         avatar until its lowest vertex is on the ground, and a head alone would sink into it."""
         own, table = self.skeleton, self.glb.table
         feet = [own.bones[f"{side}Toes"] for side in ("left", "right")]
@@ -163,7 +166,7 @@ class _Writer:
         table["nodes"].append({"name": "Soles", "mesh": len(table["meshes"]) - 1, "skin": 0})
 
     def _first_person(self, part: Part) -> str:
-        """Whether the owner of the head sees a mesh: of one that ends at the neck, a part."""
+        """Whether the wearer sees a mesh: "auto" hides only the part that follows the head."""
         own = self.skeleton
         is_head = np.zeros(max(len(own.names), INFLUENCES), np.bool_)
         for joint in range(len(own.names)):
@@ -173,7 +176,7 @@ class _Writer:
         return "thirdPersonOnly" if on.all() else "auto" if on.any() else "both"
 
     def _joints(self, nodes: list[dict[str, Any]]) -> int:
-        """The number of the root's node."""
+        """Adds the nodes and the skin of the joints, and returns the number of the root's node."""
         own, first = self.skeleton, len(nodes)
         for i, name in enumerate(own.names):
             parent = own.parents[i]
@@ -190,7 +193,8 @@ class _Writer:
             nodes.append(node)
         inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
         back = np.swapaxes(own.turns, 1, 2)
-        inverse[:, :3, :3] = back * self.step  # what a skin turns has no node that would scale it
+        # glTF ignores the node of a skinned mesh, so the scale is here
+        inverse[:, :3, :3] = back * self.step
         inverse[:, :3, 3] = np.einsum("jab,jb->ja", back, self.middle - own.places)
         joints = [first + i for i in range(len(own.names))]
         self.glb.table["skins"] = [
@@ -230,7 +234,7 @@ class _Writer:
         return {"primitives": [primitive], "extras": {"targetNames": names}}
 
     def _turns(self, part: Part) -> bool:
-        # A card of hair has the normals of the skin under it, which its own polygons do not tell.
+        # Hair cards keep the normals of the skin below, which their polygons cannot give.
         return self.wishes.normals and part.kind not in ("hair", "lashes")
 
     def _target(self, part: Part, delta: Floats, neutral: Doubles | None) -> dict[str, int]:
@@ -251,7 +255,7 @@ class _Writer:
         moved[part.rows] |= change.delta[part.rows].any(axis=1)
 
     def _places(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Metres as the file has them."""
+        """Metres as float32, or as int16 steps if positions are quantized."""
         if not self.wishes.quantize:
             return np.ascontiguousarray(values, "<f4")
         return np.clip(np.rint(values / self.step), -_STEPS, _STEPS).astype("<i2")
@@ -274,10 +278,11 @@ class _Writer:
 
 
 def _quaternion(turn: Doubles) -> list[float]:
-    """x, y, z, w of a rotation matrix."""
+    """A rotation matrix as a quaternion x, y, z, w."""
     x, y, z = np.diag(turn)
     squares = np.array([1 + x - y - z, 1 - x + y - z, 1 - x - y + z, 1 + x + y + z])
-    largest = int(squares.argmax())  # the others are divided by it
+    # the other components are divided by it, so it must not be near 0
+    largest = int(squares.argmax())
     m = turn
     rows = (
         (squares[0], m[0, 1] + m[1, 0], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checked values of JSON: numbers, names, rates and times, and the Take made from them."""
+"""Checks numbers, names, rates and times of JSON, and makes a Take from them."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .source import Take, keep_ascending, make_clip
 Doubles = npt.NDArray[np.float64]
 
 RATE_KEYS = ("exportFps", "fps", "rate", "frameRate", "framerate", "frame_rate", "sampleRate")
-# Range of frames per second; a rate outside is taken as a damaged number.
+# Range of frames per second; a rate outside it is an error in the file.
 SLOWEST, FASTEST = 0.01, 1e6
 _LARGEST = float(np.finfo(np.float32).max)
 
 
 class Reader:
-    """One file, its budget, and the caller's options on time."""
+    """The name of a file, its budget, and the caller's options on time."""
 
     def __init__(self, name: str, asked: Asked, budget: Budget) -> None:
         self.name = name

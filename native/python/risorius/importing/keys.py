@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves as keys with individual times, and their resampling to common times."""
+"""Curves whose keys have times of their own, and resampling of curves to common times."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Doubles = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
 CONSTANT, LINEAR, CUBIC = 0, 1, 2
-# Memory of one value on its way to a clip: float64 twice, float32 once.
+# Bytes per value while a clip is made: float64 twice, float32 once.
 VALUE_BYTES = 20
 
 
@@ -42,7 +42,8 @@ class Keys:
         return self.kinds.size == 0 or bool((self.kinds[:-1] == LINEAR).all())
 
     def sample(self, at: Doubles) -> Doubles:
-        """Values at times, constant before the first and after the last key."""
+        """float64[at]: values at times in seconds, constant before the first and after the last
+        key."""
         if self.times.size == 0:
             return np.zeros(at.size)
         straight = np.interp(at, self.times, self.values)
@@ -71,17 +72,17 @@ class Keys:
 def on_one_clock(
     curves: Sequence[Keys], rate: float | None, budget: Budget
 ) -> tuple[Doubles, Doubles]:
-    """All curves at the union of their key times.
+    """Resamples all curves at the union of their key times.
 
     Linear curves are then exact. Smooth and stepped curves are also sampled `rate` times per
     second.
 
     Args:
-        rate: frames per second, or None for no samples between keys.
+        rate: samples per second, or None for no samples between keys.
         budget: budget of the file.
 
     Returns:
-        float64[frames] seconds; float64[curves, frames].
+        float64[frames], seconds, and float64[curves, frames].
 
     Raises:
         BudgetError: too many curves with keys at different times, or keys too far apart.

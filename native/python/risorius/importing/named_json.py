@@ -145,8 +145,8 @@ def _own_events(reader: Reader, rows: object) -> list[Event]:
 def matrix(reader: Reader, document: object) -> Take | None:
     """{names: [...], frames: [[...], ...]}, as Audio2Face exports {facsNames, weightMat}.
 
-    A frame may be a table with the values under "weights" and a time. Returns None for another
-    layout.
+    A frame may be a table with the values under "weights" and a time. Returns None if the document
+    has another layout.
 
     Args:
         reader: reader of the file.
@@ -199,7 +199,7 @@ def matrix(reader: Reader, document: object) -> Take | None:
 def neurosync(reader: Reader, document: object) -> Take | None:
     """{"blendshapes": [[61 or 68 values], ...]}, as the NeuroSync service returns.
 
-    Returns None for another layout.
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -232,9 +232,9 @@ def neurosync(reader: Reader, document: object) -> Take | None:
 
 
 def frame_tables(reader: Reader, document: object) -> Take | None:
-    """A list of frames {time, name: value, ...}; the values may be under a key of their own.
+    """A list of frames {time, name: value, ...}; the values may be in a table under "weights".
 
-    Returns None for another layout.
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.
@@ -254,7 +254,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
         return None
     tables = [_weights(frame) for frame in frames]
     names = list(dict.fromkeys(name for table in tables for name in table))
-    # Keyed curves and rows of a curve table are lists of tables too.
+    # Keyed curves and rows of a curve table are lists of tables, too.
     if not names or any(first_key(frame, CURVE_NAME_KEYS) for frame in frames):
         return None
     rate = reader.rate_of(outer, outer.get("metadata"))
@@ -272,7 +272,7 @@ def frame_tables(reader: Reader, document: object) -> Take | None:
 
 
 def _weights(frame: Mapping[str, Any]) -> dict[str, Any]:
-    """name -> value in a frame."""
+    """name -> value of the numbers in a frame."""
     at = next((k for k in WEIGHT_KEYS if isinstance(frame.get(k), dict)), None)
     table = frame[at] if at else frame
     return {
@@ -294,7 +294,8 @@ def _frame_column(
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key of a time, or of a list of times; a frame number only if there is no time."""
+    """The key whose value is a time, or a list of times; a frame number only if there is no
+    time."""
     found = [
         (name.unit == FRAMES, key)
         for key, value in table.items()
@@ -305,8 +306,8 @@ def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None
 
 
 def curve_table(reader: Reader, document: object) -> Take | None:
-    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None: another
-    layout.
+    """Unreal's curve table: [{"Name": curve, "0": value, "0.033": value}, ...]; None if the
+    document has another layout.
 
     Args:
         reader: reader of the file.
@@ -396,7 +397,7 @@ def _keyed(reader: Reader, curves: dict[str, Keys]) -> Take:
 def lists_by_name(reader: Reader, document: object) -> Take | None:
     """{name: [values], ...}, optionally under "curves", with a rate or a list of times.
 
-    Returns None for another layout.
+    Returns None if the document has another layout.
 
     Args:
         reader: reader of the file.

@@ -8,7 +8,7 @@ from . import failed, run, text
 
 
 def main() -> int:
-    """Run the checks; if a face is named, its frame is timed."""
+    """Runs the checks; a face named as argument is used for the timing."""
     rows = run(sys.argv[1] if len(sys.argv) > 1 else None)
     print(text(rows))
     return 1 if failed(rows) else 0

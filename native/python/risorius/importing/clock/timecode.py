@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ..errors import AnimationFileError
 
-BASES = (24, 25, 30, 48, 50, 60, 100, 120)
+BASES = (24, 25, 30, 48, 50, 60, 100, 120)  # frames per second that timecodes count
 PHONES = (30, 60)  # the frame rates of nearly all phones
 DAY = 86400.0
 # A ; or , as the last separator means drop-frame, as in edit lists.
@@ -24,7 +24,7 @@ class Timecode(NamedTuple):
     minutes: int
     seconds: int
     frames: float
-    """Including its fraction."""
+    """Frame number, which may have a fraction."""
     is_dropped: bool
 
 
@@ -60,7 +60,7 @@ def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
 
 
 def infer_base(codes: Sequence[Timecode]) -> int | None:
-    """Frames per second of the timecodes' own clock, or None if it cannot be inferred.
+    """Frames per second that the timecodes count, or None if it cannot be inferred.
 
     A rate measured from the timecodes wins. If they never reach the next second, or lost too many
     rows around it, the largest frame number decides, provided that only one usual rate fits it.
@@ -84,10 +84,10 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
 def _measured(
     frames: npt.NDArray[np.float64], seconds: npt.NDArray[np.int_], largest: int
 ) -> int | None:
-    """The base that the frame numbers show where the second increases by one, or None.
+    """Infers the base from the drop of the frame number at each new second, or None.
 
-    There they fall by the base minus one step. Lost rows make them fall by less, so that an unusual
-    base counts only if others agree with it, or if no rows are lost.
+    The frame number then drops by the base minus one step. Lost rows make it drop by less, so that
+    an unusual base is accepted only if several drops agree or no rows are lost.
     """
     change, step = np.diff(seconds), np.diff(frames)
     within = step[(change == 0) & (step > 0.0)]
@@ -108,12 +108,12 @@ def _measured(
 
 
 def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.NDArray[np.float64]:
-    """Seconds of each timecode since midnight of the first, with midnights counted.
+    """Seconds of each timecode since midnight before the first; later midnights are counted.
 
     Args:
         codes: from `parse`, in the order of the frames.
-        base: frames that the timecode counts per second: 30 for 29.97.
-        is_true_rate: False if a second of timecode lasts 1.001 s: 23.976, 29.97, 59.94.
+        base: frames per second that the timecode counts: 30 for 29.97.
+        is_true_rate: False if a second of timecode lasts 1.001 s, as at 23.976, 29.97, 59.94.
 
     Returns:
         float64[codes].
@@ -124,7 +124,8 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by hours is midnight; a smaller one is a row out of order and is kept.
+    # A step back by more than 12 hours is midnight; a smaller one is a row out of order, and is
+    # kept.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)
     return seconds + np.cumsum(wraps) * (length if not dropped.any() else length * 1.001)
