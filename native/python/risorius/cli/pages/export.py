@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius export: a face with morph targets, for programs that drive targets by name."""
+"""risorius export: writes a face with morph targets, for programs that drive targets by name."""
 
 from __future__ import annotations
 
