@@ -53,7 +53,7 @@ def parse():
 
 
 def middle(collection, part):
-    """The mean of the bounding box corners of the meshes with `part` in their names (world space)."""
+    """World space mean of the bounding box corners of the meshes with `part` in their names."""
     meshes = [o for o in collection.all_objects if o.type == "MESH" and part in o.name]
     corners = [o.matrix_world @ Vector(corner) for o in meshes for corner in o.bound_box]
     return sum(corners, Vector()) / len(corners)

@@ -76,7 +76,7 @@ def seen(points: Doubles, triangles: Ints) -> NDArray[np.bool_]:
 
 
 def nearest_triangles(points: Doubles, triangles: Ints) -> Ints:
-    """Indices of the triangles in a depth buffer along -z. Back faces hide others, but are skipped."""
+    """Indices of the triangles that a depth buffer along -z shows. Back faces only hide others."""
     corners = points[triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
     low = corners[:, :, :2].reshape(-1, 2).min(axis=0)
