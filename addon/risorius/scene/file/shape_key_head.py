@@ -103,7 +103,7 @@ def shapes_of(
         ShapeFileError: no key moves a vertex.
     """
     if not item.data.polygons:
-        raise HeadError(told("{name} has no faces.", name=item.name))
+        raise HeadError(told("{name} has no polygons.", name=item.name))
     heads, face = native.part("author.heads.parts"), native.part("author.input.shape_face")
     rows = [part_of(context, one, item) for one in (item, *others)]
     # Keep the size by default, because a scaled face would not fit its body.

@@ -87,7 +87,7 @@ class RISORIUS_OT_clear_pins(FaceOperator, Operator):
 
 
 class RISORIUS_OT_select_handle(_PointOperator, Operator):
-    """Select a handle: selected ones are dragged together, keyed and hidden"""
+    """Select this handle. Selected handles are dragged, keyed and hidden together"""
 
     bl_idname = "risorius.select_handle"
     bl_label = "Select Handle"

@@ -31,7 +31,7 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
         name="Mesh", description="Its number in the file; -1: the active mesh", default=-1, min=-1
     )
     vertex: bpy.props.IntProperty(
-        name="Vertex", description="Its number; -1: the first that is selected", default=-1, min=-1
+        name="Vertex", description="Number of the vertex; -1: the first selected vertex", default=-1, min=-1
     )
 
     def execute(self, context: Context) -> Result:
