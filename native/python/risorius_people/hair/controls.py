@@ -58,7 +58,7 @@ def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
 
 
 def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Adds shapes that rotate lashes about their roots by the angle that the lid goes around the eye.
+    """Adds shapes that rotate lashes about their roots by the angle of the lid around the eye.
 
     Args:
         dna: face with joints of both eyes.
