@@ -81,7 +81,7 @@ MIDDLE = [
     ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
     ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
-# Controls of the upper and the lower lip ({v} is U or D) and of the teeth.
+# Controls of both lips and of the teeth; {v} is replaced by U or D.
 LIPS = [
     ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
     ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),

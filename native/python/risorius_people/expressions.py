@@ -280,7 +280,7 @@ def corrective_displacements(
         # The open jaw stretches the lower lip, so a smile lifts the lip less.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
-        # The raised lower lid leaves the upper lid a shorter way to close.
+        # If the lower lid is raised, the upper lid has a shorter way to close.
         blink = out[f"eyeBlink{side}"].displacement
         raised = out[f"eyeCheekRaise{side}"].displacement
         travel = np.linalg.norm(blink, axis=1)

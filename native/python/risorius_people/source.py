@@ -151,7 +151,7 @@ def _largest_in(folder: Path) -> int:
     twice."""
     largest = 0
     for path in folder.rglob("*"):
-        with suppress(OSError):  # pip may have moved the file
+        with suppress(OSError):  # pip may have moved the file meanwhile
             largest = max(largest, path.stat().st_size if path.is_file() else 0)
     return largest
 

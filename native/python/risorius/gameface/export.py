@@ -102,7 +102,7 @@ def _as_avatar(wishes: Wishes, out: str) -> Wishes:
         return wishes
     if wishes.vrm:
         licence.checked(wishes.licence, wishes.vrm, out)
-        # Presets come first: no other target may take their names.
+        # VRM presets come first, so that no other target takes their names.
         wishes = replace(wishes, shapes=tuple(dict.fromkeys(("vrm", *wishes.shapes))))
     return replace(wishes, skeleton=True)
 

@@ -25,7 +25,7 @@ _AXES = {
     "back": (0, 0, -1),
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
-_FARTHEST = 1e4  # metres
+_FARTHEST = 1e4  # metres: a vertex farther away is an error
 INFLUENCES = 4  # largest number of joints per vertex, which every client supports
 
 

@@ -43,7 +43,7 @@ _RIDGE = 1e-4
 _LEAST_GAIN = 0.001  # share of the initial squared error that a combination must remove
 _OFTEN = 12  # number of poses in which a function must be above 0
 _NEW = 0.05  # share of a function's length that the chosen functions must not explain
-_LEAST = 2e-6  # metres
+_LEAST = 2e-6  # metres: shorter displacements are set to 0
 
 
 class Refiner:

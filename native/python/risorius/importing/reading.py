@@ -48,7 +48,7 @@ _OWN_KINDS = ("clip", "rzc", "curves")
 
 
 class Options(NamedTuple):
-    """Options of `read`."""
+    """The arguments of `read` after the path."""
 
     kind: str | None
     asked: units.Asked
@@ -68,7 +68,7 @@ class RigLike(Protocol):
 
 @dataclass
 class Imported:
-    """The content of a file, before any mapping.
+    """The curves of a file before a mapping is applied.
 
     Attributes:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes

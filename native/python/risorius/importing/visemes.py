@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viseme tracks of lip sync tools, as smooth curves instead of steps."""
+"""Reads viseme tracks of lip sync tools, and makes smooth curves of them."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves; cues are timed to a hundredth of a second or a frame.
+# Frames per second of the curves; files time cues to a hundredth of a second or to a frame.
 RATE = 60.0
 # Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12
-# Moho and Papagayo count frames of a film; a .dat file does not state its rate.
+# Frames per second of a Moho .dat file, which does not state its rate: that of film.
 DAT_RATE = 24.0
-# seconds; a longer file has a wrong number
+# seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
 # Weight of each shape against its neighbours, because a mouth that never closes for an M is
 # noticed, and a shortened D is not. 1: neighbours reach at most to the middle of the shape; 0: to
@@ -180,7 +180,7 @@ def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
 
 
 def is_shape(text: str) -> bool:
-    """Whether a cell is one of Rhubarb's shapes."""
+    """Whether a text is one of Rhubarb's shapes, in any letter case."""
     return text.strip().upper() in RHUBARB
 
 
@@ -387,7 +387,7 @@ def read_pgo(text: str, name: str) -> Take:
     """
     lines = Lines(text, name)
     lines.next()
-    lines.next()  # the sound's path
+    lines.next()  # path of the sound file
     rate = float(lines.count(lines.next(), "frames a second"))
     lines.count(lines.next(), "the sound's length in frames")
     voices = []

@@ -251,4 +251,4 @@ def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubl
     ends = np.cumsum(np.bincount(owner, minlength=joints))[:-1]
     return list(
         zip(np.split(vertex[order], ends), np.split(weight[order], ends), strict=True)
-    )  # a vertex may list a joint twice: both weights count
+    )  # a vertex may list a joint twice, and both weights count

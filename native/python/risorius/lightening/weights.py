@@ -12,9 +12,9 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
-_MOST = 12  # largest number of influences of a vertex, as usual for such faces
+_MOST = 12  # largest number of joints per vertex, usual for such faces
 _TAKEN_OVER, _NEAR = 14, 6  # joints that are tried per vertex: heirs, and nearest joints
-_AT_ONCE = 512  # vertices
+_AT_ONCE = 512  # number of vertices that are refitted together
 _EVEN = 3e-3  # strength of the pull towards the weights after the takeover, which are smooth
 
 

@@ -46,9 +46,9 @@ class Status(NamedTuple):
     """Statistics of the reception, for a panel or a status line."""
 
     packets: int
-    """All packets since the start."""
+    """Number of all packets since the start."""
     frames: int
-    """Accepted faces of all subjects."""
+    """Number of accepted faces of all subjects."""
     per_second: float
     """Accepted faces of the subject in the last second."""
     refused: int
@@ -56,7 +56,7 @@ class Status(NamedTuple):
     reasons: tuple[tuple[str, int], ...]
     """(reason, number of refused packets), the most frequent first."""
     late: int
-    """Dropped faces that arrived after a newer one of their subject."""
+    """Number of faces dropped because they arrived after a newer one of their subject."""
     lost: int
     """Estimated number of lost faces, from gaps in the senders' times."""
     faceless: int
@@ -110,7 +110,8 @@ class _Subject:
             return sent
         passed = arrival - last.arrival
         step, days = sent + self._days - self._sent, 0.0
-        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:  # midnight
+        # the sender's time of day passed midnight
+        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:
             step, days = step + _DAY, _DAY
         if -_BACK <= step < 0.0:
             return None

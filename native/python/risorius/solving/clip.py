@@ -193,7 +193,7 @@ def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> N
 
 
 def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
-    """float32[F, P, 3]: target positions of points int64[P, 2]."""
+    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`."""
     return np.concatenate(
         [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )

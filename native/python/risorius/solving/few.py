@@ -31,7 +31,7 @@ _NOTHING_MM = 0.02  # mm: an attempt that brings the points nearer by less is th
 _WEAKEST = 0.01  # fraction of the strongest control's effect below which a control is not added
 _STILL = 1e-4  # a smaller change of all controls ends the iteration
 _GONE = 0.01  # price of a control that has already changed
-_HALVES = 5  # bisections on the way to another pose
+_HALVES = 5  # number of bisections between two poses
 _FEW = 2  # if more controls were selected, fewer are tried
 _FREED = 4.0  # limits of a selected control during the fit, as a multiple of its selected change
 

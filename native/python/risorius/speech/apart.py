@@ -187,7 +187,7 @@ def _hand_over(pipe: IO[bytes], lines: queue.SimpleQueue[bytes]) -> None:
         for line in pipe:
             lines.put(line)
     except (OSError, ValueError):
-        pass  # the parent closed the pipe during the read
+        pass  # this process closed the pipe while the thread was reading
     lines.put(b"")
 
 

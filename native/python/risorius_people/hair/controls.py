@@ -26,7 +26,7 @@ _WAYS = {
 }
 _LEAST_TURN = 4.0  # degrees: smaller missing rotations are ignored
 _LEAST_SHIFT = 1e-3  # centimetres: smaller displacements are ignored
-_REACH = 0.8  # factor on the tip's shift
+_REACH = 0.8  # factor on the shift of a hair's tip
 
 
 def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:

@@ -45,7 +45,7 @@ class Strips:
 
     @property
     def rows(self) -> int:
-        """Number of points per guide."""
+        """Number of points of a guide."""
         return int(self.points.shape[1])
 
     def taken(self, chosen: Ints) -> Strips:

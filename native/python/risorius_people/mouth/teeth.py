@@ -108,7 +108,8 @@ class Arch:
         self.up = up * normal * np.sign(normal[1])
 
     def at(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points, directions along the arch to the character's left, and directions to the lips.
+        """Frames of the arch: points, directions along it to the character's left, directions to
+        the lips.
 
         Args:
             way: float64[n], decimetres along the arch from the middle, positive on the left.

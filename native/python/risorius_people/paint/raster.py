@@ -7,7 +7,7 @@ import numpy as np
 
 from ..polygons import Floats, Ints, Polygons
 
-_AT_ONCE = 1 << 20  # texels per block
+_AT_ONCE = 1 << 20  # largest number of texels that are searched together
 
 
 class Raster:

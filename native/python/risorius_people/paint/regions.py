@@ -52,7 +52,7 @@ class Face:
 
     @property
     def aside(self) -> Floats:
-        """float64[V]: |x|."""
+        """float64[V]: distance from the middle of the face, |x|."""
         return np.abs(self.x)
 
     def spot(self, x: float, y: float, wide: float, high: float) -> Floats:
@@ -232,7 +232,7 @@ def yellow(face: Face) -> Floats:
 
 
 def beard(face: Face) -> Floats:
-    """Density of the beard's roots, 0 to 1, with a loose edge."""
+    """Density of the beard's roots, 0 to 1, with an uneven edge."""
     x, y, z = face.aside, face.y, face.z
     line = np.interp(
         x, (0.0, 0.17, 0.3, 0.45, 0.6, 0.72), (-0.53, -0.56, -0.70, -0.66, -0.45, -0.2)

@@ -54,7 +54,7 @@ _SIDES = {"left": 1.0, "right": -1.0}
 
 @dataclass(frozen=True)
 class Bone:
-    """A bone of a humanoid.
+    """A bone of a humanoid: its names, parent, and position in a body whose head has height 1.
 
     Attributes:
         name: VRM 1.0 name.

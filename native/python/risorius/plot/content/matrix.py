@@ -60,7 +60,7 @@ def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
     `controls`."""
     rows, columns = 9 * len(dna.joint_names), controls
     for group in dna.joint_groups:
-        # 64-bit, because -1 as an unsigned 16-bit number would be 65,535.
+        # Converted to 64 bits, because -1 as an unsigned 16-bit number would be 65,535.
         rows = max(rows, int(np.max(group.output_indices.astype(np.int64), initial=-1)) + 1)
         columns = max(columns, int(np.max(group.input_indices.astype(np.int64), initial=-1)) + 1)
     return rows, columns
