@@ -283,8 +283,7 @@ class _Making:
 
     @property
     def corrects_again(self) -> bool:
-        """Whether to search again: correctives were found, and the joint face keeps blend
-        shapes."""
+        """Whether to search again: correctives were found, and blend shapes are left."""
         return self.found and self.rig is not None and self.rig.shapes
 
 
@@ -338,8 +337,7 @@ def _fit_joints(making: _Making) -> None:
 
 
 def _correct_again(making: _Making) -> None:
-    """Searches again after the fit, because in combined expressions errors of joints and shapes add
-    up."""
+    """Searches again after the fit, because errors of joints and shapes add up."""
     if not making.corrects_again:
         return
     making.steps.at(_AGAIN_BEGINS, "searching again for errors of joints and shapes together")

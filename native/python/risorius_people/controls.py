@@ -145,8 +145,7 @@ def _filling(names: list[str]) -> list[tuple[str, Range]]:
 
 
 def _passing(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that raise and lower raw controls in turn: each starts where the last one
-    peaks."""
+    """Conditionals that raise and lower raw controls: each starts where the last one peaks."""
     count = len(names) + 1
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):

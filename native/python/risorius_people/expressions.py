@@ -292,7 +292,6 @@ def corrective_displacements(
         ball = cheek_mass(out, places, side)
         result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
         for lips in ("mouthFunnel", "mouthLipsPurse"):
-            # The open jaw moves the lower lip away from the teeth, so the lip is pushed forward
-            # less.
+            # The open jaw moves the lower lip off the teeth, so the lip is pushed forward less.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
     return result

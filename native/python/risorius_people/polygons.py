@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Changes of polygon meshes as linear operators, which convert positions and displacements
-alike."""
+"""Changes of polygon meshes as linear operators, for positions and displacements alike."""
 
 from __future__ import annotations
 

@@ -278,8 +278,7 @@ class _Maker:
 
 
 def _driven(wishes: Wishes) -> str:
-    """The group that captures drive: the first requested; in a VRM, one other than vrm if
-    possible."""
+    """The group that captures drive: the first requested one; in a VRM not vrm, if possible."""
     return next((g for g in wishes.shapes if not (wishes.vrm and g == "vrm")), wishes.shapes[0])
 
 

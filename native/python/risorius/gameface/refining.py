@@ -185,7 +185,7 @@ def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats
     """float32[R]: raw controls of the rig at given weights of ARKit units.
 
     Args:
-        targets: of the group arkit.
+        targets: targets of the group arkit.
         rest: float32[R], raw controls at rest.
         weights: float64[targets], 0 to 1.
     """

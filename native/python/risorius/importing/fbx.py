@@ -372,8 +372,7 @@ def _curves(
 
 
 def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
-    """Id of a curve node -> (component, id of a curve) of its curves; components are d|X, d|Y
-    ..."""
+    """Id of a curve node -> (component: d|X, d|Y ..., id of a curve) for its curves."""
     out: dict[int, list[tuple[str, int]]] = defaultdict(list)
     for identity in scene.of_kind("AnimationCurve"):
         for parent, way in scene.parents.get(identity, []):
@@ -451,8 +450,7 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 
 
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
-    """Flags of each key, and the slopes after it and before the next key. In the file, runs of keys
-    share them."""
+    """Flags of each key, and slopes after it and before the next key, shared by runs of keys."""
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)

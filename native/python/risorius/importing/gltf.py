@@ -56,7 +56,7 @@ class Document:
         """Makes an AnimationFileError that names the file and a place in its JSON.
 
         Args:
-            place: in the JSON.
+            place: place in the JSON.
             message: the expected and the found value.
         """
         return AnimationFileError(self.name, f"{place}: {message}")
@@ -275,7 +275,7 @@ class Document:
 
         Args:
             table: the primitive's extension.
-            place: its name in errors.
+            place: place of the extension, for errors.
 
         Raises:
             AnimationFileError: no such bytes, not a Draco mesh, or DracoPy is not installed.

@@ -36,7 +36,7 @@ class Reader:
 
         Args:
             message: the expected and the found value.
-            place: in the JSON, e.g. "frames[3]"; None: the whole document.
+            place: place in the JSON, e.g. "frames[3]"; None: the whole document.
         """
         return AnimationFileError(self.name, f"{place}: {message}" if place else message)
 
@@ -93,8 +93,7 @@ class Reader:
         return values
 
     def rate_of(self, *tables: object) -> float | None:
-        """Frames per second from the caller, else from the first of these tables that states
-        them."""
+        """Frames per second from the caller, else from the first table that states them."""
         if self.asked.rate is not None:
             return self.asked.rate
         for table in tables:
@@ -177,7 +176,7 @@ def first_key(table: Mapping[str, object], keys: Sequence[str]) -> str | None:
 
     Args:
         table: table of the JSON.
-        keys: in the order of preference.
+        keys: keys in order of preference.
     """
     return next((key for key in keys if key in table), None)
 

@@ -294,8 +294,7 @@ def _frame_column(
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key whose value is a time, or a list of times; a frame number only if there is no
-    time."""
+    """The key of a time, or of a list of times; a frame number only if there is no time."""
     found = [
         (name.unit == FRAMES, key)
         for key, value in table.items()

@@ -235,8 +235,7 @@ def drop_repeats(clip: Clip) -> Clip:
 
 
 def mirror(clip: Clip) -> Clip:
-    """Mirrors a clip: each control gets its partner's curve, and sideways angles change their
-    sign."""
+    """Mirrors a clip: partners swap their curves, and sideways angles change their sign."""
     names = [mirrored_name(name) for name in clip.names]
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)

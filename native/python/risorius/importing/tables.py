@@ -91,12 +91,11 @@ class Table:
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
-        """The cells by column. All rows must have the header's length, so call it after
-        `_check`."""
+        """The cells by column; to be called after `_check`, because rows must be equally long."""
         return list(zip(*self.rows, strict=True))
 
     def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
-        """float64[rows] of a column, for all rows or some. Raises: AnimationFileError: see
+        """float64[rows] of a column, for all rows or some. Raises: AnimationFileError: as
         `cell`."""
         values = self.whole_column(column) if rows is None else None
         if values is None:

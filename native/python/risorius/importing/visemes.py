@@ -30,8 +30,7 @@ DAT_RATE = 24.0
 # seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
 # Weight of each shape against its neighbours, because a mouth that never closes for an M is
-# noticed, and a shortened D is not. 1: neighbours reach at most to the middle of the shape; 0: to
-# its far end.
+# noticed, and a shortened D is not. 1: neighbours reach to its middle at most; 0: to its end.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,

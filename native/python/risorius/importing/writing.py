@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes clips as text (CSV, JSON, Unreal curve tables) without loss, and mappings with additional
-rows."""
+"""Writes clips as text (CSV, JSON, Unreal curve tables), and mappings with additional rows."""
 
 from __future__ import annotations
 

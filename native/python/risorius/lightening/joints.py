@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Selects joints to remove: repeatedly the joint whose vertices other joints can move with the
-least error."""
+"""Selects joints to remove: repeatedly the joint that other joints replace with the least error."""
 
 from __future__ import annotations
 

@@ -87,8 +87,7 @@ class Refit:
         return tried, found
 
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
-        """int64[n, k]: the joints that took over, the nearest joints, and the first one's
-        parent."""
+        """int64[n, k]: joints that took over, nearest joints, and the parent of the first one."""
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
         apart = (points**2).sum(1)[:, None] - 2 * points @ places.T + (places**2).sum(1)

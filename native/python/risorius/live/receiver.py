@@ -181,8 +181,7 @@ class Receiver:
         self.stop()
 
     def start(self) -> None:
-        """Starts to listen. Raises: LiveError: the port is not available or a package is
-        missing."""
+        """Starts to listen. Raises: LiveError: the port is in use, or a package is missing."""
         if self._thread is not None:
             return
         if self.source == "osc":
@@ -204,8 +203,7 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject heard first that still has a
-        place."""
+        """The latest frame of a subject; for "", of the first one heard that still has a place."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -221,8 +219,7 @@ class Receiver:
         self._reserved = frozenset(subjects)
 
     def _kept(self, label: str) -> bool:
-        """Whether a subject keeps its place; otherwise a recording would jump if its clock
-        restarted."""
+        """Whether a subject keeps its place; a recording would jump if its clock restarted."""
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:

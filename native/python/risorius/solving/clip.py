@@ -97,8 +97,8 @@ class _Frame:
     def linearise(self, raw: Doubles, within: float) -> bool:
         """Computes derivatives at a pose, unless they exist for a pose within a distance.
 
-        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of a
-        control."""
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of
+        raw."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)

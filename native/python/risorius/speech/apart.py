@@ -80,8 +80,7 @@ def speak_apart(
         "transcript": transcript,
         "options": {**options, "library": _texts(options.get("library"))},
     }
-    # The process writes its error output to a file, because a full pipe without a reader would
-    # block it.
+    # Error output goes to a file, because a full pipe without a reader would block the process.
     with tempfile.TemporaryFile() as said, _started(said) as process:
         try:
             _write(process, task)
@@ -160,8 +159,7 @@ def _write(process: subprocess.Popen[bytes], task: dict[str, Any]) -> None:
 def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterator[dict[str, Any]]:
     """The messages of the process until it ends.
 
-    Raises: CancelledError: cancel() returned true. RecogniserError: no message for _PATIENCE
-    seconds."""
+    Raises: CancelledError: cancel() returned true. RecogniserError: no message for an hour."""
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_hand_over, args=(process.stdout, lines), daemon=True).start()
     heard = monotonic()

@@ -109,8 +109,7 @@ class Revolved:
         return np.concatenate([rings.reshape(-1, 3), tips])
 
     def points(self) -> Floats:
-        """float64[vertices, 3]: positions in radii of the ball, with the gaze along +z; poles
-        last."""
+        """float64[vertices, 3]: positions in radii of the ball, gaze along +z; poles last."""
         return self._spread(self.away, self.along, [p[0] for p in self.poles if p])
 
     def uvs(self) -> Floats:

@@ -109,8 +109,7 @@ def find_places(
     line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
     corner = np.abs(line[:, 0]).max()
     _, lip_distance = nearest(positions, line)
-    # A parabola of height over width, because the lips touch over some millimetres, not along a
-    # line.
+    # A parabola, because the lips touch over some millimetres, not along a line.
     height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
     aside = np.minimum(np.abs(positions[:, 0]), corner)
     upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)

@@ -192,8 +192,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     density = beard_density(man, lips, style)
     over = _over_lip(man)
     spacing = _BEARD_SPACING * (1.0 if full else 0.8)
-    # Hair above the lip is short and fine, because long hair would enter the skin if the mouth
-    # moves.
+    # Hair above the lip is short, because long hair would enter the skin if the mouth moves.
     finer = surface.scattered(density * over, _OVER_LIP * spacing, random)
     roots = joined_roots([surface.scattered(density * ~over, spacing, random), finer])
     n = len(roots)

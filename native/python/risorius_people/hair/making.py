@@ -48,8 +48,7 @@ _PITCH = 2.4  # distance between turns, in radii of the coil, for hair_curl 1
 
 @dataclass
 class Grown:
-    """The hair of a person: mesh (hair, brows, beard, eyelashes) -> strips, for the meshes that the
-    person has."""
+    """The hair of a person: mesh (hair, brows, beard, eyelashes) -> strips, if there are any."""
 
     strips: dict[str, Strips]
     unit: float  # length of a decimetre in the unit of the Dna's meshes

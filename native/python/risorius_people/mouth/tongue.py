@@ -47,8 +47,7 @@ def over_lip(
 
 
 def _up(positions: Floats, vertices: Ints, lift: Floats) -> Floats:
-    """float64[V, 3]: a lift along y. Args: positions: float64[V, 3]; vertices: lifted; lift: per
-    vertex."""
+    """float64[V, 3]: `lift` along y. Args: positions: float64[V, 3]; vertices: with a lift each."""
     out = np.zeros_like(positions)
     out[vertices, 1] = lift
     return out

@@ -214,8 +214,7 @@ def blood(face: Face, age: int) -> Floats:
 
 
 def shade_of_eyes(face: Face) -> Floats:
-    """Mask of the dark skin under the eyes, where veins show, 0 to 1, from the inner corner
-    outward."""
+    """Mask of the dark skin under the eyes, where veins show, 0 to 1."""
     along = np.clip((face.aside - 0.13) / 0.30, 0, 1)
     rim = -0.15 - 0.075 * np.sin(np.pi * np.clip(along * 0.9 + 0.05, 0, 1))
     away = np.abs(face.y - rim) / 0.062

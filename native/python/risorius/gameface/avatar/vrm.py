@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the tables that turn a glTF into a VRM: humanoid, expressions, look-at, first person,
-licence."""
+"""Makes the tables of a VRM: humanoid, expressions, look-at, first person, licence."""
 
 from __future__ import annotations
 

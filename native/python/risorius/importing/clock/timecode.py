@@ -124,7 +124,7 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by more than 12 hours is midnight; a smaller one is a row out of order, and is
+    # A step back by more than 12 hours is midnight; smaller ones are rows out of order, and are
     # kept.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)

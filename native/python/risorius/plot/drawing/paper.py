@@ -73,8 +73,7 @@ def rgb(region: str) -> npt.NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Canvas:
-    """A figure, or a part of one, with its size in inches, so that distances are independent of
-    it."""
+    """A figure, or a part of one, and its size in inches, in which drawings measure distances."""
 
     figure: FigureBase
     width: float
