@@ -134,7 +134,7 @@ def lighten(
 
     Args:
         dna: a face with meshes; not changed.
-        joints: number of joints to keep; None: all.
+        joints: number of joints to keep; None: all that the kept LODs need.
         correctives: number of correctives to keep; None: all.
         lods: numbers of the LODs to keep, 0 is the finest; None: all.
         keep: names of further joints that must stay.
