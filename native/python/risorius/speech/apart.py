@@ -5,10 +5,10 @@ A program that embeds Python, such as Blender, may have loaded another libpocket
 ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. A
 separate process avoids this, turns a crash into an error message, and can be killed at any time.
 
-  this process                                 separate process
-  one line of JSON: the task           -->     speak()
-  share, share, ..., clip or error     <--     lines of JSON
-  the pipe closes: cancelled, or dead  -->     ends
+    this process                                 separate process
+    one line of JSON: the task           -->     speak()
+    share, share, ..., clip or error     <--     lines of JSON
+    the pipe closes: cancelled, or dead  -->     ends
 """
 
 from __future__ import annotations
