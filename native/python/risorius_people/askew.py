@@ -24,7 +24,7 @@ _STAYS = (
     "cornea",
     "teeth",
     "tongue",
-)  # groups of the base mesh, by parts of names
+)  # parts of names of groups of the base mesh that stay symmetric
 
 
 def askew(source: Source, body: Body, person: Person) -> Floats:

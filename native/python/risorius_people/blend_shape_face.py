@@ -332,8 +332,7 @@ def assemble(
         ex.corrective_displacements(units, places), body.closing, body.eye_correctives, tongue
     ):  # fmt: skip
         correctives |= {tuple(pair): way for pair, way in found.items()}
-    # CLOSED has no shape: this corrective corrects the rotations of its joints, which do not add
-    # up.
+    # CLOSED has no shape: its corrective completes joint rotations, which do not add up.
     correctives[ex.CLOSED] = np.zeros_like(positions)
     raw = list(units)
     pairs = list(correctives)

@@ -43,7 +43,7 @@ NEW_JOINTS = 250
 # centimetres: 10 micrometres, so that rounding errors are at most 5 micrometres
 DELTA_STEP = 2.0**-10
 WEIGHTS = 4096  # skin weights are multiples of 1 / WEIGHTS
-NO_WRINKLES = 4  # the first LOD without wrinkles
+NO_WRINKLES = 4  # number of the first LOD without wrinkles
 # progress, as a fraction of the whole work, at which the fit of the joints begins
 _FIT_BEGINS = 0.2
 _SEARCH_ENDS = 0.4  # likewise, at which the search for correctives ends
@@ -267,7 +267,7 @@ class _Making:
     texture_size: int
     steps: Steps
     dna: Dna = field(default_factory=Dna)  # + the face that becomes the result
-    shapes: Dna = field(default_factory=Dna)  # the blend shape face
+    shapes: Dna = field(default_factory=Dna)  # the symmetric blend shape face
     found: bool = False  # whether the search found correctives
     textures: dict[str, bytes] = field(default_factory=dict)  # file name -> content
 
@@ -283,8 +283,7 @@ class _Making:
 
     @property
     def corrects_again(self) -> bool:
-        """Whether to search again: correctives were found, and the joint face keeps blend
-        shapes."""
+        """Whether to search again: correctives were found, and blend shapes are left."""
         return self.found and self.rig is not None and self.rig.shapes
 
 
@@ -338,8 +337,7 @@ def _fit_joints(making: _Making) -> None:
 
 
 def _correct_again(making: _Making) -> None:
-    """Searches again after the fit, because in combined expressions errors of joints and shapes add
-    up."""
+    """Searches again after the fit, because errors of joints and shapes add up."""
     if not making.corrects_again:
         return
     making.steps.at(_AGAIN_BEGINS, "searching again for errors of joints and shapes together")

@@ -81,7 +81,7 @@ MIDDLE = [
     ("CTRL_C_tongue_tipMove.tx", "tongueTipLeft", "tongueTipRight"),
     ("CTRL_C_tongue_thickThin.ty", "tongueThick", "tongueThin"),
 ]
-# Controls of the upper and the lower lip ({v} is U or D) and of the teeth.
+# Controls of both lips and of the teeth; {v} is replaced by U or D.
 LIPS = [
     ("CTRL_{s}_mouth_towards{v}.ty", "mouthLipsTowards{v}", ""),
     ("CTRL_{s}_mouth_tighten{v}.ty", "mouthLipsTighten{v}", ""),
@@ -145,8 +145,7 @@ def _filling(names: list[str]) -> list[tuple[str, Range]]:
 
 
 def _passing(names: list[str]) -> list[tuple[str, Range]]:
-    """Conditionals that raise and lower raw controls in turn: each starts where the last one
-    peaks."""
+    """Conditionals that raise and lower raw controls: each starts where the last one peaks."""
     count = len(names) + 1
     out: list[tuple[str, Range]] = []
     for k, name in enumerate(names):

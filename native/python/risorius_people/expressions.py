@@ -280,7 +280,7 @@ def corrective_displacements(
         # The open jaw stretches the lower lip, so a smile lifts the lip less.
         smile = out[f"mouthCornerPull{side}"].displacement
         result[("jawOpen", f"mouthCornerPull{side}")] = -0.3 * lower * smile
-        # The raised lower lid leaves the upper lid a shorter way to close.
+        # If the lower lid is raised, the upper lid has a shorter way to close.
         blink = out[f"eyeBlink{side}"].displacement
         raised = out[f"eyeCheekRaise{side}"].displacement
         travel = np.linalg.norm(blink, axis=1)
@@ -292,7 +292,6 @@ def corrective_displacements(
         ball = cheek_mass(out, places, side)
         result[(f"mouthCornerPull{side}", f"eyeCheekRaise{side}")] = ball
         for lips in ("mouthFunnel", "mouthLipsPurse"):
-            # The open jaw moves the lower lip away from the teeth, so the lip is pushed forward
-            # less.
+            # The open jaw moves the lower lip off the teeth, so the lip is pushed forward less.
             result[("jawOpen", f"{lips}D{side}")] = -0.25 * out[f"{lips}D{side}"].displacement
     return result

@@ -37,8 +37,7 @@ _COLOURS = ("skin", "flush", "lids", "lips", "hair", "brows", "shirt")
 
 @dataclass(frozen=True)
 class Person:
-    """The definition of a sample person. Colours are sRGB in [0, 1]; cast.toml explains the
-    keys."""
+    """The definition of a sample person. Colours are sRGB in [0, 1]; see cast.toml for the keys."""
 
     name: str
     gender: str

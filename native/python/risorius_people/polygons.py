@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Changes of polygon meshes as linear operators, which convert positions and displacements
-alike."""
+"""Changes of polygon meshes as linear operators, for positions and displacements alike."""
 
 from __future__ import annotations
 
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[Any]  # NumPy's stubs lose the type in arithmetic
+Floats = NDArray[Any]  # Any, because NumPy's stubs lose the type in arithmetic
 Ints = NDArray[Any]
 
 
@@ -38,7 +37,7 @@ class Polygons:
 
     faces: list[list[int]]
     uv_faces: list[list[int]]
-    uvs: Floats  # [T, 2]
+    uvs: Floats  # [T, 2] texture coordinates
     vertex_count: int
 
 

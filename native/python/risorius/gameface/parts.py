@@ -25,7 +25,7 @@ _AXES = {
     "back": (0, 0, -1),
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
-_FARTHEST = 1e4  # metres
+_FARTHEST = 1e4  # metres: a vertex farther away is an error
 INFLUENCES = 4  # largest number of joints per vertex, which every client supports
 
 
@@ -69,7 +69,7 @@ class Points:
         """Prepares the vertices of a LOD.
 
         Args:
-            dna: with geometry.
+            dna: face with geometry.
             rig: compiled from it.
             lod: number of the LOD.
             skeleton: joints of the exported file.
@@ -116,7 +116,7 @@ class Points:
         if len(mesh.texture_coordinates):
             textures = mesh.layout_texture_coordinates.astype(np.int64)
         key = places * (int(textures.max(initial=0)) + 1) + textures
-        # Vertices in the order of the triangles: neighbours are close in memory, so packing is
+        # In the order of the triangles, neighbouring vertices are close in memory, which packs
         # better.
         _, first, turn = np.unique(key[layouts.ravel()], return_index=True, return_inverse=True)
         order = np.argsort(first, kind="stable")

@@ -43,7 +43,7 @@ _RIDGE = 1e-4
 _LEAST_GAIN = 0.001  # share of the initial squared error that a combination must remove
 _OFTEN = 12  # number of poses in which a function must be above 0
 _NEW = 0.05  # share of a function's length that the chosen functions must not explain
-_LEAST = 2e-6  # metres
+_LEAST = 2e-6  # metres: shorter displacements are set to 0
 
 
 class Refiner:
@@ -185,7 +185,7 @@ def pose_of(targets: Sequence[Target], rest: Floats, weights: Doubles) -> Floats
     """float32[R]: raw controls of the rig at given weights of ARKit units.
 
     Args:
-        targets: of the group arkit.
+        targets: targets of the group arkit.
         rest: float32[R], raw controls at rest.
         weights: float64[targets], 0 to 1.
     """

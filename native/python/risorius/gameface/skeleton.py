@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The joints of a game face: root, neck, head, jaw and eyes, or the bones of a humanoid."""
+"""Finds the joints of a game face: root, neck, head, jaw and eyes, or the bones of a humanoid."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _LISTED = 6
 
 @dataclass(frozen=True)
 class Target:
-    """A morph target.
+    """A morph target, and the pose of the rig that it shows.
 
     Attributes:
         name: spelled as the client expects.

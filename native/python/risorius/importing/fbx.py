@@ -32,12 +32,12 @@ TIME_MODES = {
     17: 60000 / 1001, 18: 120000 / 1001,
 }  # fmt: skip
 _TOP = {"GlobalSettings", "Objects", "Connections"}
-# Nodes that are skipped unread, because they are most of a file.
+# Records whose content is skipped, because they are most of a file.
 _BULK = frozenset(("Geometry", "Video", "Texture", "Material", "Pose", "Implementation"))
 _SCALARS = {"Y": "<h", "C": "<?", "B": "<?", "I": "<i", "F": "<f", "D": "<d", "L": "<q"}
 _ARRAYS = {"f": "<f4", "d": "<f8", "l": "<i8", "i": "<i4", "b": "<u1", "c": "<u1"}
 _DEEPEST = 32
-# Bytes of memory per record, per value of a record and per key of a curve, rounded up.
+# Memory in bytes per record, per value of a record and per key of a curve, rounded up.
 _NODE_BYTES, _VALUE_BYTES, _KEY_BYTES = 300, 48, 120
 # Bits of KeyAttrFlags: interpolation and tangents of a key.
 _CONSTANT, _CUBIC, _AUTO, _TCB, _CLAMP, _WEIGHTED = 0x2, 0x8, 0x100, 0x200, 0x5000, 0x3000000
@@ -85,13 +85,13 @@ class Node:
         return next((node for node in self.inner if node.name == name), None)
 
     def array(self, name: str) -> npt.NDArray[Any]:
-        """The array in a nested record, unpacked; empty if there is none."""
+        """The unpacked array of a nested record; empty if there is none."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.unfold() if isinstance(value, Packed) else np.zeros(0)
 
     def length(self, name: str) -> int:
-        """The length of the array according to the file, before it is unpacked."""
+        """The array's length that the file states, before the array is unpacked."""
         node = self.first(name)
         value = node.values[0] if node is not None and node.values else None
         return value.count if isinstance(value, Packed) else 0
@@ -129,11 +129,11 @@ class Parser:
         self.version = struct.unpack_from("<I", data, 23)[0]
         if not 7100 <= self.version < 9000:
             raise self.fail(23, f"FBX 7.1 to 8.x was expected, found {self.version}")
-        # From 7.5 on offsets have 64 bits.
+        # Since FBX 7.5 offsets have 64 bits.
         self.head = struct.Struct("<QQQB" if self.version >= 7500 else "<IIIB")
 
     def fail(self, at: int, message: str) -> AnimationFileError:
-        """An AnimationFileError that names the file and a byte of it.
+        """Makes an AnimationFileError that names the file and the byte.
 
         Args:
             at: offset in the file, bytes.
@@ -225,14 +225,14 @@ class Scene:
     _keys: dict[int, Keys] = field(default_factory=dict)
 
     def keys(self, curve: int) -> Keys:
-        """The keys of an AnimationCurve, unpacked on first use."""
+        """The keys of a curve, unpacked at first use. Args: curve: id of the AnimationCurve."""
         if curve not in self._keys:
             self._keys[curve] = _keys(self, self.objects[curve], self.notes)
         return self._keys[curve]
 
     @cached_property
     def children(self) -> dict[int, list[int]]:
-        """Parent -> children, in the order of objects in `parents`; each child once."""
+        """Parent id -> ids of its children in file order; each child once."""
         out: dict[int, list[int]] = {}
         for child, links in self.parents.items():
             self.budget.work(len(links), "connections")
@@ -314,7 +314,7 @@ def properties(node: Node | None) -> dict[str, list[Any]]:
 
 
 def _rate(scene: Scene) -> float:
-    """Frames per second of the scene."""
+    """Frames per second of the scene's time mode; 30 if unknown."""
     rows = {name: values[-1] for name, values in properties(scene.settings).items()}
     custom = rows.get("CustomFrameRate")
     if rows.get("TimeMode") == 14 and isinstance(custom, int | float) and 0 < custom < 1e4:
@@ -352,7 +352,8 @@ def _curves(
             continue
         for owner, way in _owners(scene, links):
             if owner.name == "Geometry" and way in channels:
-                continue  # repeats the percentage of a blend shape, for other software
+                # a copy of the blend shape's percentage, which exporters add for other software
+                continue
             scene.budget.work(len(parts), "connections")
             named = _named(scene, owner, way, parts)
             bones += not named
@@ -371,8 +372,7 @@ def _curves(
 
 
 def _components(scene: Scene) -> dict[int, list[tuple[str, int]]]:
-    """Id of a curve node -> (component, id of a curve) of its curves; components are d|X, d|Y
-    ..."""
+    """Id of a curve node -> (component: d|X, d|Y ..., id of a curve) for its curves."""
     out: dict[int, list[tuple[str, int]]] = defaultdict(list)
     for identity in scene.of_kind("AnimationCurve"):
         for parent, way in scene.parents.get(identity, []):
@@ -394,7 +394,7 @@ def _in_stack(scene: Scene, layer: int, stack: int) -> bool:
 def _named(
     scene: Scene, owner: Node, way: str, parts: Sequence[tuple[str, int]]
 ) -> list[tuple[str, Keys]]:
-    """(curve's name, keys) of a property; empty for the location of a bone and the like."""
+    """(name of a curve, its keys) for an animated property; empty for a bone's transform."""
     name = object_name(owner)
     if way == "DeformPercent":
         return [(name, _scaled(scene, scene.keys(curve), 0.01)) for _, curve in parts[:1]]
@@ -417,7 +417,7 @@ def _scaled(scene: Scene, keys: Keys, factor: float) -> Keys:
 
 
 def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
-    """Keys of an AnimationCurve.
+    """Reads the keys of an AnimationCurve.
 
     Raises:
         AnimationFileError: numbers of times and values differ, or times do not ascend.
@@ -450,8 +450,7 @@ def _keys(scene: Scene, node: Node, notes: list[str]) -> Keys:
 
 
 def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]:
-    """Flags of each key, and the slopes after it and before the next; the file stores runs of
-    keys."""
+    """Flags of each key, and slopes after it and before the next key, shared by runs of keys."""
     flags = node.array("KeyAttrFlags").astype(np.int64)
     runs = node.array("KeyAttrRefCount").astype(np.int64)
     data = node.array("KeyAttrDataFloat").astype(np.float64)
@@ -468,7 +467,7 @@ def _attributes(node: Node, count: int) -> tuple[npt.NDArray[np.int64], Doubles]
 def _auto(
     times: Doubles, values: Doubles, flags: npt.NDArray[np.int64], leave: Doubles, arrive: Doubles
 ) -> tuple[Doubles, Doubles]:
-    """Slopes of keys with automatic tangents: parallel to their neighbours, flat at an extreme."""
+    """Sets slopes of automatic tangents: parallel to the neighbours, flat at an extreme."""
     automatic = ((flags & _AUTO) != 0) & ((flags & _TCB) == 0)
     if times.size < 2 or not automatic.any():
         return leave, arrive

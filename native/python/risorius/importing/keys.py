@@ -21,7 +21,7 @@ VALUE_BYTES = 20
 
 @dataclass
 class Keys:
-    """The keys of one curve.
+    """The keys of one curve, with their interpolation.
 
     Attributes:
         times: float64[keys], seconds, ascending.
@@ -42,8 +42,7 @@ class Keys:
         return self.kinds.size == 0 or bool((self.kinds[:-1] == LINEAR).all())
 
     def sample(self, at: Doubles) -> Doubles:
-        """float64[at]: values at times in seconds, constant before the first and after the last
-        key."""
+        """Values at times in seconds, constant before the first and after the last key."""
         if self.times.size == 0:
             return np.zeros(at.size)
         straight = np.interp(at, self.times, self.values)
@@ -87,7 +86,7 @@ def on_one_clock(
     Raises:
         BudgetError: too many curves with keys at different times, or keys too far apart.
     """
-    # Curves with common times normally share one array.
+    # Curves with equal times normally share one array.
     parts = list({id(keys.times): keys.times for keys in curves if keys.times.size}.values())
     if not parts:
         return np.zeros(0), np.zeros((len(curves), 0))
@@ -98,7 +97,7 @@ def on_one_clock(
         _take(len(curves), (times[-1] - times[0]) * rate, times, budget)
         count = int(np.floor((times[-1] - times[0]) * rate + 1e-6)) + 1
         times = np.union1d(times, times[0] + np.arange(count) / rate)
-    # Key times that differ only by rounding are one time.
+    # Key times closer than a microsecond differ by rounding only, and become one time.
     times = times[np.concatenate([[True], np.diff(times) > 1e-6])]
     _take(len(curves), times.size, times, budget)
     rows = np.empty((len(curves), times.size))

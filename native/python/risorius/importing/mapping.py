@@ -50,7 +50,7 @@ _KEYED, _STEP, _MOST_STEPS = 0.1, 1 / 24, 64
 
 
 class MappingError(AnimationFileError):
-    """An inconsistent mapping."""
+    """A mapping that cannot be read, or is inconsistent."""
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,8 @@ class Mapping:
         return find
 
     def _spellings(self, name: str) -> Iterator[str]:
-        """The name itself, without a known prefix, without a mesh's name, and in the vocabulary's
-        spelling."""
+        """The spellings under which a name is looked up: itself, without known prefixes, without a
+        mesh's name, as in the vocabulary."""
         yield name
         for start in self.strip:
             if name.lower().startswith(start.lower()) and len(name) > len(start):
@@ -256,7 +256,7 @@ def _between(times: Doubles) -> Doubles | None:
 
 
 def fits(control: str, pattern: str) -> bool:
-    """Whether a pattern with * and ? matches a control, with or without its prefix; case counts."""
+    """Whether a pattern with * and ? matches a control's name or its short name; case counts."""
     short = control.partition(".")[2] if control.startswith("CTRL_expressions.") else control
     return fnmatch.fnmatchcase(control, pattern) or fnmatch.fnmatchcase(short, pattern)
 
@@ -287,14 +287,14 @@ def _files() -> frozenset[str]:
 
 
 def mapping_title(name: str) -> str:
-    """The title of a built-in mapping: its vocabulary's title, or its name."""
+    """The displayed title of a built-in mapping."""
     if name in vocabulary.names():
         return vocabulary.vocabulary(name).title
     return name.replace("_", " ").title()
 
 
 def mapping_text(name: str) -> str:
-    """The TOML of a built-in mapping, for saving and editing.
+    """The TOML text of a built-in mapping, which users may save and edit.
 
     Raises:
         MappingError: unknown name.
@@ -540,7 +540,7 @@ def _number(value: object, at: str, where: str) -> float:
 
 
 def check(mapping: Mapping, rig_names: Iterable[str]) -> list[str]:
-    """The controls of a mapping that a rig lacks.
+    """Compares a mapping with a rig.
 
     Args:
         mapping: the mapping.
@@ -584,7 +584,7 @@ def best_mapping(names: Sequence[str], columns: Sequence[str] | None = None) -> 
         is_sure = is_vowels or not all(map(_is_letter, hits))
         if is_sure and (found := hits.intersection(names)):
             scores.append((-len(found), -len(hits), len(mapping.rows), mapping.name))
-    if len(known[ARKIT]) >= arkit.FULL_SET:  # VRM expressions repeat the units
+    if len(known[ARKIT]) >= arkit.FULL_SET:  # the expressions of VRM include the ARKit units
         scores = [score for score in scores if score[-1] != "vrm"]
     return min(scores)[-1] if scores else None
 
@@ -595,7 +595,7 @@ def _is_letter(curve: str) -> bool:
 
 
 def single_letters(names: Iterable[str]) -> list[str]:
-    """The mappings that know single-letter curves; empty unless all curves are letters."""
+    """Names of the mappings that know single-letter curves; empty unless all curves are letters."""
     names = list(names)
     if not names or any(len(name) > 1 for name in names):
         return []

@@ -25,7 +25,7 @@ NAME_KEYS = (
 )  # fmt: skip
 MATRIX_KEYS = ("weightMat", "frames", "weights", "values", "data", "blendshapes", "blendShapes")
 WEIGHT_KEYS = ("weights", "values", "blendShapes", "blendshapes", "curves", "shapes")
-# NeuroSync returns rows without names: Live Link Face's columns, then seven emotions.
+# The last columns of NeuroSync's rows, after the columns of Live Link Face.
 NEUROSYNC_EMOTIONS = ("Angry", "Disgusted", "Fearful", "Happy", "Neutral", "Sad", "Surprised")
 NEUROSYNC_RATE = 60.0
 KEYS_KEYS = ("Keys", "keys")
@@ -35,7 +35,7 @@ DEEPEST = 64
 
 
 def parse(text: str, name: str) -> object:
-    """The document in a JSON text.
+    """Parses a JSON text.
 
     Args:
         text: content of the file.
@@ -52,14 +52,14 @@ def parse(text: str, name: str) -> object:
         ) from error
     except RecursionError as error:
         raise AnimationFileError(name, "not JSON that can be read: nested too deeply") from error
-    except ValueError as error:  # a number of thousands of digits
+    except ValueError as error:  # such as a number with thousands of digits
         raise AnimationFileError(name, f"not JSON that can be read: {error}") from error
 
 
 def read(
     document: object, name: str, asked: Asked | None = None, budget: Budget | None = None
 ) -> Take:
-    """The curves of a document, by the first layout that fits.
+    """Reads the curves of a document by the first layout that fits.
 
     Args:
         document: parsed JSON.
@@ -91,7 +91,7 @@ def read(
 
 
 def own_clip(reader: Reader, document: object) -> Take | None:
-    """The layout of `importing.write_json`; None if the document has another one.
+    """Reads the layout of `importing.json_text`; None if the document has another one.
 
     Args:
         reader: reader of the file.
@@ -294,8 +294,7 @@ def _frame_column(
 
 
 def _time_key(table: Mapping[str, Any], *, of_lists: bool = False) -> str | None:
-    """The key whose value is a time, or a list of times; a frame number only if there is no
-    time."""
+    """The key of a time, or of a list of times; a frame number only if there is no time."""
     found = [
         (name.unit == FRAMES, key)
         for key, value in table.items()
@@ -331,7 +330,7 @@ def curve_table(reader: Reader, document: object) -> Take | None:
 
 
 def keyed_curves(reader: Reader, document: object) -> Take | None:
-    """Curves with keys {Time, Value}, anywhere in the document.
+    """Reads curves with keys {Time, Value}, anywhere in the document.
 
     An Unreal animation's FloatCurves have this layout: [{CurveName, FloatCurve: {Keys: [...]}}].
     Returns None if there are no such curves.
@@ -371,7 +370,7 @@ def _key_number(reader: Reader, row: Mapping[str, object], key: str, place: str)
 
 
 def _find_curves(value: object, depth: int) -> list[tuple[str, list[Any]]]:
-    """(name, keys) of all curves inside a value."""
+    """(name, keys) of all curves at any depth of a value, up to `depth`."""
     if depth == 0:
         return []
     if isinstance(value, list):
@@ -429,7 +428,7 @@ def lists_by_name(reader: Reader, document: object) -> Take | None:
 
 
 def _is_rows(value: object) -> bool:
-    """Whether a value is a list of lists, or of tables with a list in each."""
+    """Whether a value is a list whose rows are lists, or tables with a list of weights."""
     if not isinstance(value, list) or not value:
         return False
     return all(

@@ -23,7 +23,7 @@ Doubles = npt.NDArray[np.float64]
 
 # Smallest range from the neutral value to 1; a smaller one would only amplify noise.
 LEAST_RANGE = 0.05
-# Mirroring a face negates these angles.
+# Angles that change their sign when a face is mirrored.
 _MIRRORED_ANGLES = ("yaw", "roll")
 
 
@@ -235,7 +235,7 @@ def drop_repeats(clip: Clip) -> Clip:
 
 
 def mirror(clip: Clip) -> Clip:
-    """Swap left and right: each control takes its partner's curve, sideways angles change sign."""
+    """Mirrors a clip: partners swap their curves, and sideways angles change their sign."""
     names = [mirrored_name(name) for name in clip.names]
     turned = [name in ANGLES and name.rpartition(".")[2] in _MIRRORED_ANGLES for name in names]
     signs = np.where(np.array(turned, bool), -1.0, 1.0).astype(np.float32)

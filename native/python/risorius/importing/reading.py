@@ -48,7 +48,7 @@ _OWN_KINDS = ("clip", "rzc", "curves")
 
 
 class Options(NamedTuple):
-    """Options of `read`."""
+    """The arguments of `read` after the path."""
 
     kind: str | None
     asked: units.Asked
@@ -68,7 +68,7 @@ class RigLike(Protocol):
 
 @dataclass
 class Imported:
-    """The content of a file, before any mapping.
+    """The curves of a file before a mapping is applied.
 
     Attributes:
         clip: curves with the file's own names and times; time 0 is the first frame, or for visemes
@@ -343,8 +343,8 @@ def import_file(
     """Reads a file and maps it to a clip of raw controls; also reports the use of its curves.
 
     Args:
-        path, kind, rate, timecode_rate, time_unit, take: as in `read`.
-        rig_names, mapping, rig, rotations, full_value, angles: as in `Imported.apply`.
+        path, kind, rate, timecode_rate, time_unit, take: see `read`.
+        rig_names, mapping, rig, rotations, full_value, angles: see `Imported.apply`.
 
     Raises:
         ValueError: an error of `read` or `Imported.apply`.
@@ -377,7 +377,7 @@ def import_curves(
         curves: name of a shape key or property -> (float64[keys] seconds, ascending; float[keys]
             values), linear between keys.
         source: name of the curves in the report.
-        rig_names, mapping, rig, rotations: as in `Imported.apply`.
+        rig_names, mapping, rig, rotations: see `Imported.apply`.
 
     Raises:
         ValueError: no curves, times that do not ascend, values that are not finite; errors of

@@ -52,7 +52,7 @@ class Report:
         return [(heading, names) for heading, names in rows if names]
 
     def text(self) -> str:
-        """The whole report as lines of text."""
+        """The complete report as lines of text."""
         controls = {control for row in self.mapped.values() for control in row}
         out = [
             f"{self.source}: {self.kind}, mapping {self.mapping}",
@@ -67,7 +67,7 @@ class Report:
 
 
 def _lines(text: str) -> list[str]:
-    """Wrap a long line without splitting names."""
+    """Wraps a long line without splitting names."""
     return wrap(
         text, _WIDTH, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False
     )

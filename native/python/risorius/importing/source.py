@@ -24,7 +24,7 @@ MAX_BYTES = 1 << 30
 # Times further apart than at this rate (per second) are times of keys, not of frames.
 LEAST_RATE = 8.0
 USUAL_RATE = 60.0
-# Share of frames that a take may lose because their time does not ascend.
+# largest fraction of frames that may be dropped because their time does not ascend
 MOST_LOST = 1.0 / 3.0
 RATES = (12.0, 23.976, 24.0, 25.0, 29.97, 30.0, 48.0, 50.0, 59.94, 60.0, 90.0, 100.0, 120.0, 240.0)
 
@@ -47,7 +47,7 @@ class Take:
 
 
 def read_bytes(path: Path, *, found: bool = False) -> bytes:
-    """The bytes of a file.
+    """Reads the bytes of a file.
 
     Args:
         path: path of the file.
@@ -173,7 +173,8 @@ def number(text: str, name: str, line: int, column: int | str) -> float:
         AnimationFileError: not a number, NaN, infinite or outside float32.
     """
     try:
-        value = float(text.replace("_", "?"))  # 1_000 is a number only in Python
+        # "_" is replaced, because 1_000 is a number only in Python
+        value = float(text.replace("_", "?"))
     except ValueError:
         found = text if len(text) <= 40 else text[:40] + "..."
         raise AnimationFileError(

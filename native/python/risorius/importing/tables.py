@@ -35,7 +35,7 @@ COMMENTS = ("#", "//", "%")
 _NAMED_DELIMITER = re.compile(r"sep=(.|\\t)", re.IGNORECASE)
 # Cells that mean a missing value.
 _MISSING = frozenset(("", "-", "--", "\N{EN DASH}", "na", "n/a", "#n/a", "null", "none"))
-# Curves of a Live Link Face take, in their order.
+# Names of the curves of a Live Link Face take, in the order of its columns.
 LIVE_LINK_FACE = (
     *(unit[0].upper() + unit[1:] for unit in arkit.order("live_link_face_take")),
     *"HeadYaw HeadPitch HeadRoll LeftEyeYaw LeftEyePitch LeftEyeRoll".split(),
@@ -69,7 +69,7 @@ class Table:
     notes: list[str] = field(default_factory=list)
 
     def cell(self, row: int, column: int) -> float:
-        """The number in a cell.
+        """Parses the number in a cell.
 
         Args:
             row: from 0, without the header.
@@ -91,12 +91,11 @@ class Table:
 
     @cached_property
     def columns(self) -> list[tuple[str, ...]]:
-        """The cells by column. All rows must have the header's length, so call it after
-        `_check`."""
+        """The cells by column; to be called after `_check`, because rows must be equally long."""
         return list(zip(*self.rows, strict=True))
 
     def column(self, column: int, rows: Sequence[int] | None = None) -> Doubles:
-        """float64[rows] of a column, for all rows or some. Raises: AnimationFileError: see
+        """float64[rows] of a column, for all rows or some. Raises: AnimationFileError: as
         `cell`."""
         values = self.whole_column(column) if rows is None else None
         if values is None:
@@ -155,7 +154,7 @@ def read_table(text: str, name: str) -> Table:
         raise AnimationFileError(name, f"no table: {error}", line=reader.line_num) from error
     if not rows:
         raise AnimationFileError(name, "it holds nothing")
-    # NumPy writes its header as a comment.
+    # NumPy writes the header as a comment.
     named = next(csv.reader([comment], delimiter=delimiter), [])
     if len(named) == len(rows[0]) and all(map(_is_number, rows[0])):
         rows.insert(0, named)
@@ -190,7 +189,7 @@ def _check(table: Table, line: int) -> None:
             "a header with the names of the curves was expected, found numbers",
             line=line,
         )
-    # A header that ends in a delimiter has one more empty column; its rows may lack it.
+    # A header that ends in a delimiter has an empty column at its end, which the rows may lack.
     if len(table.header) > 1 and not table.header[-1]:
         table.header.pop()
         for row in table.rows:
@@ -292,7 +291,7 @@ def read_live_link_face(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _timecode_seconds(table: Table, column: int, asked: Asked, notes: list[str]) -> Doubles:
-    """Seconds of the timecodes in a column, or of row numbers if rows are counted."""
+    """Seconds of the timecodes in a column; of row numbers if the caller counts rows."""
     if asked.counts_rows:
         return row_times(len(table.rows), asked, table.name)
     codes = [
@@ -388,7 +387,7 @@ def read_plain(table: Table, asked: Asked = _FILE_TELLS) -> Take:
 
 
 def _time_column(table: Table) -> int | None:
-    """The column of the times, preferably a time rather than a frame number."""
+    """Index of the column of times; a column of frame numbers only if there is no other."""
     found = [(i, name) for i, h in enumerate(table.header) if (name := time_name(h)) is not None]
     found.sort(key=lambda row: row[1].unit == FRAMES)
     return found[0][0] if found else None
@@ -416,7 +415,7 @@ def _is_curve(table: Table, column: int, notes: list[str]) -> bool:
         notes.append(f"{table.header[column] or f'column {column + 1}'}: empty, left out")
         return False
     if not header:
-        return False  # the row numbers that pandas writes without a header
+        return False  # a column of row numbers without a header, as pandas writes
     if not any(re.search(r"\d", cell) or _is_number(cell) for cell in cells):
         notes.append(f"{table.header[column]}: text, left out")
         return False
@@ -491,8 +490,8 @@ def _column(table: Table, column: int, times: Doubles, holes: list[tuple[str, in
     known = np.flatnonzero(filled)
     values = table.column(column, known.tolist())
     if filled.all():
-        return values  # decimal commas
+        return values  # numbers with decimal commas, which whole_column does not parse
     holes.append((table.header[column], int((~filled).sum())))
-    # A clock that runs back would distort the curve; its frames are dropped later.
+    # Times that go back would distort the interpolation; their frames are dropped later.
     at = np.maximum.accumulate(times)
     return np.interp(at, at[known], values)

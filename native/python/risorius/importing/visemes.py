@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Viseme tracks of lip sync tools, as smooth curves instead of steps."""
+"""Reads viseme tracks of lip sync tools, and makes smooth curves of them."""
 
 from __future__ import annotations
 
@@ -21,17 +21,16 @@ from .source import Take, number
 
 Doubles = npt.NDArray[np.float64]
 
-# Frames per second of the curves; cues are timed to a hundredth of a second or a frame.
+# Frames per second of the curves; files time cues to a hundredth of a second or to a frame.
 RATE = 60.0
 # Seconds of the transition from one mouth shape to the next.
 BLEND = 0.12
-# Moho and Papagayo count frames of a film; a .dat file does not state its rate.
+# Frames per second of a Moho .dat file, which does not state its rate: that of film.
 DAT_RATE = 24.0
-# seconds; a longer file has a wrong number
+# seconds: a longer file is assumed to contain a wrong number
 LONGEST = 7200.0
 # Weight of each shape against its neighbours, because a mouth that never closes for an M is
-# noticed, and a shortened D is not. 1: neighbours reach at most to the middle of the shape; 0: to
-# its far end.
+# noticed, and a shortened D is not. 1: neighbours reach to its middle at most; 0: to its end.
 DOMINANCE = {
     "A": 1.0, "B": 0.3, "C": 0.5, "D": 0.7, "E": 0.6, "F": 0.8, "G": 0.9, "H": 0.5, "X": 0.3,
     "MBP": 1.0, "FV": 0.9, "U": 0.8, "WQ": 0.8, "O": 0.7, "AI": 0.7, "L": 0.5, "etc": 0.3,
@@ -180,7 +179,7 @@ def rhubarb_column(times: Doubles, shapes: Sequence[str], name: str) -> Take:
 
 
 def is_shape(text: str) -> bool:
-    """Whether a cell is one of Rhubarb's shapes."""
+    """Whether a text is one of Rhubarb's shapes, in any letter case."""
     return text.strip().upper() in RHUBARB
 
 
@@ -387,7 +386,7 @@ def read_pgo(text: str, name: str) -> Take:
     """
     lines = Lines(text, name)
     lines.next()
-    lines.next()  # the sound's path
+    lines.next()  # path of the sound file
     rate = float(lines.count(lines.next(), "frames a second"))
     lines.count(lines.next(), "the sound's length in frames")
     voices = []

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes clips as text (CSV, JSON, Unreal curve tables) without loss, and mappings with additional
-rows."""
+"""Writes clips as text (CSV, JSON, Unreal curve tables), and mappings with additional rows."""
 
 from __future__ import annotations
 
@@ -57,7 +56,7 @@ def json_text(clip: Clip) -> str:
         "events": [event._asdict() for event in clip.events],
         "metadata": clip.metadata,
     }
-    # json writes all digits of a double; a float32 needs fewer.
+    # Not by json, which would write all digits of a double; a float32 needs fewer.
     rows = [
         f"{json.dumps(name)}: [{', '.join(map(_shortest, curve))}]"
         for name, curve in zip(clip.names, clip.curves, strict=True)
@@ -100,7 +99,7 @@ def curve_table_text(clip: Clip, *, is_json: bool) -> str:
 
 
 def write_text(text: str, path: str | os.PathLike[str]) -> None:
-    """Write a text file atomically.
+    """Writes a text file atomically.
 
     Args:
         text: the new content, written as UTF-8.

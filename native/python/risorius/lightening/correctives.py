@@ -15,7 +15,7 @@ from ..base.errors import ArgumentError
 from ..base.words import counted
 from .poses import Pose, motions_at
 
-_AT_ONCE = 1 << 15  # joints that are posed at once
+_AT_ONCE = 1 << 15  # limits the number of joints that are posed together
 _LOOKED_AT = 6000  # largest number of vertices that is needed to rank correctives
 
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Selects joints to remove: repeatedly the joint whose vertices other joints can move with the
-least error."""
+"""Selects joints to remove: repeatedly the joint that other joints replace with the least error."""
 
 from __future__ import annotations
 
@@ -251,4 +250,4 @@ def held_by_joint(meshes: Sequence[Mesh], joints: int) -> list[tuple[Ints, Doubl
     ends = np.cumsum(np.bincount(owner, minlength=joints))[:-1]
     return list(
         zip(np.split(vertex[order], ends), np.split(weight[order], ends), strict=True)
-    )  # a vertex may list a joint twice: both weights count
+    )  # a vertex may list a joint twice, and both weights count

@@ -134,7 +134,7 @@ def lighten(
 
     Args:
         dna: a face with meshes; not changed.
-        joints: number of joints to keep; None: all.
+        joints: number of joints to keep; None: all that the kept LODs need.
         correctives: number of correctives to keep; None: all.
         lods: numbers of the LODs to keep, 0 is the finest; None: all.
         keep: names of further joints that must stay.
@@ -247,7 +247,7 @@ def _part(progress: Progress | None, begin: float, end: float) -> Told:
 
 
 def _fewer_correctives(work: _Work, rig: Rig, correctives: int) -> list[int]:
-    """Rows of the correctives to remove, from 0."""
+    """Chooses the correctives to remove: their rows, from 0."""
     contribution = contributions(work.dna, rig, work.poses)
     work.told(1.0)
     return least_correctives(work.dna, work.dna.psd_count - correctives, contribution)
@@ -321,7 +321,7 @@ class _Thinning:
         self.poses = poses_of(dna, self.rig)
         self.parents = np.asarray(dna.joint_parents, np.int64)
         self.table, self.mirrored = joint_table(dna), mirrored_joints(dna)
-        self.level: dict[int, int] = {}  # the finest level of each mesh
+        self.level: dict[int, int] = {}  # index of a mesh -> its finest LOD
         for lod in reversed(range(dna.lod_count)):
             self.level |= {m: lod for m in listed_meshes(dna, lod) if m < len(dna.meshes)}
         self.numbers = sorted(self.level)

@@ -28,7 +28,7 @@ class Vertices:
         """Args:
         dna: the face.
         rig: compiled from it.
-        lod: the level.
+        lod: number of the LOD.
         """
         self.meshes = [m for m in listed_meshes(dna, lod) if m < len(dna.meshes)]
         self.counts = [len(dna.meshes[m].positions) for m in self.meshes]

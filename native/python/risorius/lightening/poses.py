@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The poses in which faces are compared: each expression, and each corrective with its controls."""
+"""Makes the poses in which faces are compared: each expression, and each corrective."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@ from ..author.geometry import skeleton as sk
 from ..author.geometry.skeleton import Doubles, Ints
 from .simplex import shares
 
-_MOST = 12  # largest number of influences of a vertex, as usual for such faces
+_MOST = 12  # largest number of joints per vertex, usual for such faces
 _TAKEN_OVER, _NEAR = 14, 6  # joints that are tried per vertex: heirs, and nearest joints
-_AT_ONCE = 512  # vertices
+_AT_ONCE = 512  # number of vertices that are refitted together
 _EVEN = 3e-3  # strength of the pull towards the weights after the takeover, which are smooth
 
 
@@ -87,8 +87,7 @@ class Refit:
         return tried, found
 
     def _tried(self, points: Doubles, rows: Doubles) -> Ints:
-        """int64[n, k]: the joints that took over, the nearest joints, and the first one's
-        parent."""
+        """int64[n, k]: joints that took over, nearest joints, and the parent of the first one."""
         took = self.kept[np.argsort(-rows[:, self.kept], axis=1, kind="stable")[:, :_TAKEN_OVER]]
         places = self.places[self.kept]
         apart = (points**2).sum(1)[:, None] - 2 * points @ places.T + (places**2).sum(1)

@@ -24,7 +24,7 @@ class Packet(NamedTuple):
 
     subject: str
     device: str
-    """Distinguishes two senders with the same subject name; may be empty."""
+    """Device of the sender, which distinguishes senders with equal subject names; may be empty."""
     time: float | None
     """Seconds on the sender's clock; None if it sends no time."""
     names: tuple[str, ...]
@@ -45,7 +45,7 @@ class Frame(NamedTuple):
     """Number of this frame among the subject's frames, from 1."""
     names: tuple[str, ...]
     values: Floats
-    """float32[names], read-only."""
+    """float32[names], values of these names; read-only."""
 
 
 def unit_name(name: str) -> str:

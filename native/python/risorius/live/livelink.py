@@ -34,7 +34,7 @@ _SHAPES = 52
 _SIGNS = np.array([1.0] * _SHAPES + [-1.0, -1.0, 1.0] * 3, np.float32)
 _COUNTS = (len(NAMES), _SHAPES, _SHAPES - 1)
 _LONGEST_TEXT = 256
-_LARGEST = 100.0  # no blend shape and no angle of a face is larger
+_LARGEST = 100.0  # larger values are no blend shapes or angles of a face
 
 
 class NoFace(LiveError):  # noqa: N818  not an error of the sender

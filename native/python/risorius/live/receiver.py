@@ -46,9 +46,9 @@ class Status(NamedTuple):
     """Statistics of the reception, for a panel or a status line."""
 
     packets: int
-    """All packets since the start."""
+    """Number of all packets since the start."""
     frames: int
-    """Accepted faces of all subjects."""
+    """Number of accepted faces of all subjects."""
     per_second: float
     """Accepted faces of the subject in the last second."""
     refused: int
@@ -56,7 +56,7 @@ class Status(NamedTuple):
     reasons: tuple[tuple[str, int], ...]
     """(reason, number of refused packets), the most frequent first."""
     late: int
-    """Dropped faces that arrived after a newer one of their subject."""
+    """Number of faces dropped because they arrived after a newer one of their subject."""
     lost: int
     """Estimated number of lost faces, from gaps in the senders' times."""
     faceless: int
@@ -110,7 +110,8 @@ class _Subject:
             return sent
         passed = arrival - last.arrival
         step, days = sent + self._days - self._sent, 0.0
-        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:  # midnight
+        # the sender's time of day passed midnight
+        if step < -_DAY / 2.0 and step + _DAY <= passed + _AHEAD:
             step, days = step + _DAY, _DAY
         if -_BACK <= step < 0.0:
             return None
@@ -180,8 +181,7 @@ class Receiver:
         self.stop()
 
     def start(self) -> None:
-        """Starts to listen. Raises: LiveError: the port is not available or a package is
-        missing."""
+        """Starts to listen. Raises: LiveError: the port is in use, or a package is missing."""
         if self._thread is not None:
             return
         if self.source == "osc":
@@ -203,8 +203,7 @@ class Receiver:
             self._socket = None
 
     def latest(self, subject: str = "") -> Frame | None:
-        """The latest frame of a subject; for "", of the subject heard first that still has a
-        place."""
+        """The latest frame of a subject; for "", of the first one heard that still has a place."""
         with self._lock:
             found = self._find(subject)
             return found.latest if found else None
@@ -220,8 +219,7 @@ class Receiver:
         self._reserved = frozenset(subjects)
 
     def _kept(self, label: str) -> bool:
-        """Whether a subject keeps its place; otherwise a recording would jump if its clock
-        restarted."""
+        """Whether a subject keeps its place; a recording would jump if its clock restarted."""
         return label in self._reserved or any(take.subject == label for take in self._takes)
 
     def record(self, subject: str = "", limit: int = 108_000) -> Take:

@@ -2,10 +2,10 @@
 """A list of senders with limited places, and the rule by which a new sender takes a place.
 
 A flood of forged senders must not displace a phone. Therefore:
-  a wanted sender (named or recorded) always gets a place and keeps it
-  the first sender of each address keeps its place once it has streamed, even while silent
-  an address with at least two more senders than the newcomer's address gives up one of them
-  any other sender is displaced by a newcomer while it is silent
+    a wanted sender (named or recorded) always gets a place and keeps it
+    the first sender of each address keeps its place once it has streamed, even while silent
+    an address with at least two more senders than the newcomer's address gives up one of them
+    any other sender is displaced by a newcomer while it is silent
 """
 
 from __future__ import annotations

@@ -178,8 +178,7 @@ class Shaper:
         self._ranges, self._remap = ranges, None
 
     def plan(self, names: tuple[str, ...]) -> Plan:
-        """The plan for these names; it is kept, because the next frame usually has the same
-        names."""
+        """The plan for these names, kept because the next frame usually has the same names."""
         if self._plan is None or names != self._names:
             self._plan, self._names = Plan(names, self.mapping), names
             self._filter, self._remap = _new_filter(), None

@@ -11,7 +11,7 @@ from .shaping import Plan, Shaper
 
 
 class Take:
-    """Frames of one subject with their times, in order; gaps are kept.
+    """The recorded frames of one subject, in order of time; gaps are kept.
 
     Attributes:
         subject: the recorded subject; "" until the first frame determines it.

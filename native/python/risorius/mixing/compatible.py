@@ -43,7 +43,7 @@ _TOPOLOGY = (
     "layout_normals",
 )
 _VALUES = ("texture_coordinates", "normals")
-_OTHERS = {  # layers that a mix takes from the first face, so that all faces must have the same
+_OTHERS = {  # a mix takes these layers from the first face, so they must be equal in all faces
     "blend_shape_channels": "drivers of blend shapes",
     "rbf_behavior": "RBF solvers",
     "rbf_behavior_ext": "poses of RBF solvers",
@@ -52,7 +52,7 @@ _OTHERS = {  # layers that a mix takes from the first face, so that all faces mu
     "machine_learned_behavior_ext": "operations and joints of neural networks",
     "joint_behavior_metadata": "kinds of joint rotations",
 }
-_QUATERNION = 1  # rotation in joint_representations
+_QUATERNION = 1  # value in joint_representations for quaternion rotation
 
 
 def difference(one: Dna, other: Dna) -> str | None:
@@ -71,7 +71,8 @@ def difference(one: Dna, other: Dna) -> str | None:
 
 
 def check_compatible(faces: Sequence[Dna], names: Sequence[str]) -> None:
-    """Raises ValueError with the name of the first face that cannot be mixed with the first one.
+    """Raises ValueError for the first face that cannot be mixed with faces[0]; the message names
+    it.
 
     Args:
         faces: faces to mix, at least one.

@@ -148,8 +148,7 @@ def _block(
     levels_of: dict[int, int],
     levels: int,
 ) -> list[JointGroup]:
-    """Merges the given rows into one group with all columns of the sources; empty without
-    columns."""
+    """Merges rows into one group with all columns of the sources; empty without columns."""
     order = sorted(rows, key=lambda row: -levels_of[row])
     inputs = sorted({int(c) for source in sources for c in source.group.input_indices})
     if not order or not inputs:

@@ -142,7 +142,7 @@ class Places:
         self.shifts = _middles(mixed, rims) - self.sizes[:, :, None] * middles
 
     def of_mesh(self, mesh: int) -> Share:
-        """The shares of a mesh's vertices.
+        """The shares of the vertices of a mesh.
 
         Args:
             mesh: index of the mesh.

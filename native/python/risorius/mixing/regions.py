@@ -61,7 +61,7 @@ class Masks:
         self._dna, self._budget = without_hair(dna), budget
         listed, count = self._dna.lod_mesh_mapping, len(self._dna.meshes)
         self._levels = [[int(m) for m in listed[lod] if m < count] for lod in range(len(listed))]
-        self._skins: dict[int, int] = {}  # level -> the largest mesh that is not rigid
+        self._skins: dict[int, int] = {}  # LOD -> the largest mesh that is not rigid
         for lod, rows in enumerate(self._levels):
             free = [m for m in rows if _rigid(self._dna.mesh_names[m]) is None]
             if free:

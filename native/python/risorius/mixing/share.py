@@ -31,7 +31,7 @@ class Share:
         return self.scaled is self.weights
 
     def places(self, points: Sequence[object]) -> Doubles:
-        """float64[n, 3]: the mixed positions of the parents' points.
+        """float64[n, 3]: the mixed positions of corresponding points of the parents.
 
         Args:
             points: float64[n, 3] of each parent.

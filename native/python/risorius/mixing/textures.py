@@ -35,15 +35,15 @@ WHY = {
 }
 """Why an image comes from the leading parent alone: key -> reason."""
 _KEY = "texture:"
-_MOST_BYTES = 1 << 28  # largest image in bytes
+_MOST_BYTES = 1 << 28  # bytes: larger images are refused
 _MASKS = "*_msk.png"  # wrinkle masks, which have no metadata entry and are recognised by name
 
 
 def texture_folder(path: Path) -> Path:
-    """The folder of a DNA file's textures.
+    """The folder of a DNA file's textures: <name>_textures beside the file.
 
     Args:
-        path: path of the file.
+        path: path of the DNA file.
     """
     return path.with_name(path.stem + "_textures")
 

@@ -19,11 +19,11 @@ from .drawing.paper import ACCENT, INK, MUTED, RULE, Canvas, settings
 from .page_parts import SCRIPT, STYLE
 
 _VARIABLES = {INK: "--ink", MUTED: "--muted", RULE: "--rule", ACCENT: "--accent"}
-WIDTH = 12.4  # inches
+WIDTH = 12.4  # width of the drawings in inches
 
 
 def render(facts: Facts, lod: int, dpi: int) -> bytes:
-    """The page as HTML in UTF-8.
+    """The HTML page in UTF-8.
 
     Args:
         facts: facts of the face.

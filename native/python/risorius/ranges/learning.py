@@ -23,17 +23,17 @@ Doubles = npt.NDArray[np.float64]
 MOST_GAIN = 1.6
 """Largest gain; a control that would need more did not reach its extreme in the take."""
 SHORTEST = 2.0
-"""Shortest take in seconds."""
+"""Seconds: shorter takes are refused."""
 # largest gain of lids, higher because everybody can shut the eyes: a low peak is a weak capture
 _LID_GAIN = 2.0
 _LEAST_RANGE = 0.15  # ranges below it count as hardly moving
 _LEAST_OVER_NOISE = 8.0  # smallest range in standard deviations of the noise
 _REST_SHARE = 10  # smallest percentage of frames in which a control must be at rest
 _HIGHEST_REST = 0.25  # a control whose lowest tenth of values is higher is never at rest
-_SPIKE = 0.05  # seconds: shorter peaks are ignored
+_SPIKE = 0.05  # seconds of the median filter, so that shorter peaks are ignored
 _WIDEST = 4  # frames to either side: largest window of the median, which limits the memory
 _NEAR = 0.8  # fraction of the highest peak from which a peak counts as extreme
-_LOW_PEAKS = 25  # percentage of these peaks that may stay below 1
+_LOW_PEAKS = 25  # percentage of the extreme peaks that may stay below 1 after rescaling
 _LOW_BLINKS = 10  # the same for lids, because an incomplete blink is noticeable
 _CEILING = 0.85  # in a performance, half of the peaks must reach this fraction of the highest
 _LEAST_PEAKS = 3  # in a performance, smallest number of peaks

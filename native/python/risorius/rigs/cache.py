@@ -58,7 +58,7 @@ def compile_cached(
             named = DnaError(f"{os.fspath(path)}: {error}")
             named.code, named.where, named.offset = error.code, error.where, error.offset
             raise named from None
-        dna = load(path)  # its error names the file
+        dna = load(path)  # raises the error again, with the name of the file
     rig = Rig(dna, precision=precision, rotation=rotation, simd=simd)
     with contextlib.suppress(OSError, DnaError):
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -83,7 +83,7 @@ def _three(threshold: float | Sequence[float]) -> tuple[float, float, float]:
 
 
 def _indices(dna: Dna, regions: Regions) -> list[list[int]]:
-    """Joint indices of each region.
+    """Converts regions to lists of joint indices.
 
     Raises:
         ValueError: no joint has the name or index.

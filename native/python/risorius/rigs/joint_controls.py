@@ -56,7 +56,7 @@ class JointControl:
     axes: Doubles
 
     def values(self, turns: npt.ArrayLike) -> Doubles:
-        """The values of the four controls.
+        """The values of the four controls for rotations of the joint.
 
         Args:
             turns: float[..., 4], unit quaternions x, y, z, w: rotation of the joint relative to its
@@ -136,7 +136,7 @@ def _what_is_wrong(stem: str, by_part: dict[str, list[int]], where: dict[str, in
 
 
 def _read_by_solvers(dna: Dna) -> set[int]:
-    """Raw controls that RBF solvers, twists and swings read as quaternions."""
+    """Indices of raw controls that RBF solvers, twists and swings read as quaternions."""
     behavior = dna.twist_swing_behavior
     read = [solver.raw_control_indices for solver in dna.rbf_behavior.solvers]
     read += [setup.input_control_indices for setup in (*behavior.twists, *behavior.swings)]
@@ -159,7 +159,7 @@ def turn_axes(dna: Dna, joint: int) -> Doubles:
         rest = product(rest, convention.quaternion(dna.neutral_joint_rotations[link]))
     known = all(word in _FACE_AXES for word in dna.coordinate_system)
     words = dna.coordinate_system if known else ("right", "up", "front")
-    face = np.array([_FACE_AXES[word] for word in words]).T  # file -> face
+    face = np.array([_FACE_AXES[word] for word in words]).T  # converts file axes to face axes
     sign = -1.0 if np.linalg.det(face) < 0.0 else 1.0
     return sign * matrix(rest).T @ face.T
 
@@ -207,7 +207,7 @@ def shared(turns: Doubles, share: float) -> Doubles:
 
 
 def bone_turns(bone: str, curves: Mapping[str, npt.NDArray[np.float32]]) -> Doubles | None:
-    """The rotation of the neck or the head in a clip.
+    """The rotation of the neck or the head in each frame of a clip.
 
     Args:
         bone: "neck" or "head".
@@ -236,7 +236,7 @@ def head_turns(angles: npt.NDArray[Any]) -> Doubles:
     """
     half = np.asarray(angles, np.float64) / 2.0
     (sy, sp, sr), (cy, cp, cr) = np.sin(half.T), np.cos(half.T)
-    # The product of yaw about z, pitch about -x and roll about y.
+    # The product of rotations: yaw about z, pitch about -x, roll about y.
     return np.stack(
         [
             -cp * sr * sy - cr * cy * sp,

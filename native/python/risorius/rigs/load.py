@@ -20,7 +20,7 @@ from .._native import (
 from ..base import signatures
 from ..base.errors import ArgumentError
 
-# The format's data layers that each name of `layers` loads.
+# Name for the argument `layers` -> the layers of the file that it loads.
 _LAYERS = {
     "descriptor": set[str](),
     "definition": {"definition"},
@@ -41,9 +41,9 @@ class Finding(NamedTuple):
     is_error: bool
     code: str
     where: str
-    """The DNA field, e.g. behavior.joint_groups[3].values[7]."""
+    """Path of the field in the Dna, e.g. behavior.joint_groups[3].values[7]."""
     offset: int | None
-    """Byte offset in the file."""
+    """Byte offset in the file, or None."""
     message: str
 
     def __str__(self) -> str:

@@ -63,7 +63,7 @@ def product(a: Doubles, b: Doubles) -> Doubles:
 
 
 def angle_degrees(a: Doubles, b: Doubles) -> float:
-    """The angle between the rotations a and b, 0 to 180 degrees.
+    """The angle between two rotations in degrees, 0 to 180.
 
     Args:
         a, b: float64[4], unit quaternions (x, y, z, w).

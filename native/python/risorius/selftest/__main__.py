@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""python -m risorius.selftest [FACE.dna]: prints the report; exit code 0 only if all checks
-pass."""
+"""python -m risorius.selftest [FACE.dna]: prints the report; exits with 0 if all checks pass."""
 
 import sys
 

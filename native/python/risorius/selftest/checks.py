@@ -37,7 +37,7 @@ _NAME = "Prüfung 面.dna"  # a file name that fails in code with narrow file na
 
 
 class Row(NamedTuple):
-    """The result of one check."""
+    """The result of one check: its name, whether it passed, and a text."""
 
     name: str
     passed: bool

@@ -97,8 +97,8 @@ class _Frame:
     def linearise(self, raw: Doubles, within: float) -> bool:
         """Computes derivatives at a pose, unless they exist for a pose within a distance.
 
-        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of a
-        control."""
+        Returns: whether they were computed. Args: raw: float64[R]; within: largest change of
+        raw."""
         if self._at is not None and np.abs(raw - self._at).max() <= within:
             return False
         self._probe.linearise(raw, self._job.high, self._job.free)
@@ -193,7 +193,7 @@ def _check_numbers(rate: float, start: float, sparse: float, smooth: float) -> N
 
 
 def _targets(moved: dict[int, Floats], points: npt.NDArray[np.int64]) -> Floats:
-    """float32[F, P, 3]: target positions of points int64[P, 2]."""
+    """float32[F, P, 3]: target positions of the points (mesh, vertex) in `points`."""
     return np.concatenate(
         [moved[mesh][:, points[points[:, 0] == mesh, 1]] for mesh in sorted(moved)], axis=1
     )

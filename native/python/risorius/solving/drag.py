@@ -192,8 +192,7 @@ def _both_on(
 
 
 def _transposed(drag: Drag, at: Doubles, rounds: int) -> Doubles:
-    """Gradient descent within the limits; the length of each step minimises the linearised
-    error."""
+    """Gradient descent within the limits; each step's length minimises the linearised error."""
     for _ in range(max(1, 3 * rounds)):
         jacobian, missing = drag.jacobian(at), drag.residual(drag.positions(at))
         toward = drag.unknowns.columns(jacobian).T @ missing

@@ -19,8 +19,8 @@ _HARD = 0.1  # fraction of the largest ease below which a control belongs elsewh
 _MISSING, _MISSING_MM = 0.02, 0.6
 _HELP, _HELP_MM = 0.02, 1.3
 _DEAR = 100.0  # price of controls that belong elsewhere, so that all others are selected first
-# Smallest effect of a selectable control relative to the strongest, and of one that belongs
-# elsewhere.
+# Smallest effect of a selectable control relative to the strongest one; the second number is for
+# controls that belong elsewhere.
 _WEAK, _WEAK_ELSEWHERE = 0.05, 0.1
 # mm: more controls are added if few end farther from the targets than all by this distance. If few
 # end nearer than this, the solution with all controls is not computed.
@@ -31,7 +31,7 @@ _NOTHING_MM = 0.02  # mm: an attempt that brings the points nearer by less is th
 _WEAKEST = 0.01  # fraction of the strongest control's effect below which a control is not added
 _STILL = 1e-4  # a smaller change of all controls ends the iteration
 _GONE = 0.01  # price of a control that has already changed
-_HALVES = 5  # bisections on the way to another pose
+_HALVES = 5  # number of bisections between two poses
 _FEW = 2  # if more controls were selected, fewer are tried
 _FREED = 4.0  # limits of a selected control during the fit, as a multiple of its selected change
 
@@ -154,8 +154,7 @@ def nearer(
 def _agreeing(
     drag: Drag, begin: Doubles, few: Doubles, every: Doubles, pairs: npt.NDArray[np.int64]
 ) -> tuple[Drag, Doubles]:
-    """Holds the opposites of controls that are on in `every`, at the smaller value of both
-    poses."""
+    """Holds the opposites of controls that are on in `every`, at the smaller value of two poses."""
     on = every[pairs] > np.maximum(begin[pairs], 0.0) + ON
     off = [
         int(pair[1 - side])

@@ -35,7 +35,7 @@ class Performance(NamedTuple):
     frames: Floats
     """float32[F, V, 3]: positions in each frame."""
     rate: float
-    """Frames per second."""
+    """Frames per second of the file."""
     start: float
     """Time of the first frame in seconds."""
     neutral: Floats | None

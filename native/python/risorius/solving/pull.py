@@ -118,8 +118,7 @@ def make_drag(
 
 @dataclass
 class Unknowns:
-    """The unknowns of a drag: changes of single controls, or of a control and its partner
-    together."""
+    """The unknowns of a drag: changes of single controls, or of two partners together."""
 
     first: npt.NDArray[np.int64]  # [U]: indices of controls
     second: npt.NDArray[np.int64]  # [U]: indices of their partners, or of the controls themselves
@@ -146,8 +145,7 @@ class Unknowns:
         return np.asarray(change[self.first] / self.scale)
 
     def limits(self, low: Doubles, high: Doubles) -> tuple[Doubles, Doubles]:
-        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], limits of a
-        change."""
+        """float64[U] each: limits of the unknowns. Args: low, high: float64[R], of a change."""
         lowest = np.maximum(low[self.first], low[self.second]) / self.scale
         return lowest, np.minimum(high[self.first], high[self.second]) / self.scale
 

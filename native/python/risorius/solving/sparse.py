@@ -56,8 +56,7 @@ class _Path:
         self.price = float(self._wish().max(initial=0.0))
 
     def _wish(self) -> Doubles:
-        """float64[n]: size of the gradient of each resting unknown that may move in that
-        direction."""
+        """float64[n]: size of the gradient of each resting unknown that may follow it."""
         room = np.where(self.pull > 0, self.high > 0, self.low < 0) & (self.state == _REST)
         return np.where(room, np.abs(self.pull), 0.0)
 
@@ -112,8 +111,7 @@ class _Path:
         self.state[which], self.sign[which] = _MOVES, np.sign(self.pull[which])
 
     def _stops(self, rate: Doubles) -> tuple[Doubles, Doubles]:
-        """The value at which each moving unknown stops, and the decrease of the price until
-        then."""
+        """The value at which each moving unknown stops, and the price's decrease until then."""
         stop = np.where(rate > 0, self.high, self.low)
         back = (self.x * rate < 0) | ((self.x == 0) & (rate * self.sign < 0))
         stop = np.where(back, 0.0, stop)
@@ -122,8 +120,7 @@ class _Path:
         return stop, when
 
     def _begins(self, slope: Doubles) -> tuple[Doubles, Doubles]:
-        """The decrease of the price until each resting unknown begins to move, and its
-        direction."""
+        """The price's decrease until each resting unknown begins to move, and its direction."""
         rests = self.state == _REST
         if self.left >= 0:
             rests[self.left] = False

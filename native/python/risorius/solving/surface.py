@@ -215,7 +215,8 @@ def numbers(name: str, values: npt.ArrayLike) -> Doubles:
     """
     try:
         out = np.asarray(values, np.float64)
-    except (TypeError, ValueError, OverflowError):  # NumPy raises each of them
+    # NumPy raises each of these errors for arguments that are no numbers
+    except (TypeError, ValueError, OverflowError):
         raise ArgumentError(f"{name}: numbers were expected") from None
     if not (np.abs(out) <= LARGEST).all():
         raise ArgumentError(f"{name}: finite numbers were expected")

@@ -3,7 +3,7 @@
 
 sound file --listen--> phonemes with times --viseme_weights--> visemes --controls--> Clip
 
-  clip = risorius.speech.speak("voice.wav", "Hello, how are you?")
+    clip = risorius.speech.speak("voice.wav", "Hello, how are you?")
 """
 
 from __future__ import annotations

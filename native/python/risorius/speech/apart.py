@@ -5,10 +5,10 @@ A program that embeds Python, such as Blender, may have loaded another libpocket
 ffmpeg. The linker then gives its functions to the recogniser too, which fails or crashes. A
 separate process avoids this, turns a crash into an error message, and can be killed at any time.
 
-  this process                                 separate process
-  one line of JSON: the task           -->     speak()
-  share, share, ..., clip or error     <--     lines of JSON
-  the pipe closes: cancelled, or dead  -->     ends
+    this process                                 separate process
+    one line of JSON: the task           -->     speak()
+    share, share, ..., clip or error     <--     lines of JSON
+    the pipe closes: cancelled, or dead  -->     ends
 """
 
 from __future__ import annotations
@@ -80,8 +80,7 @@ def speak_apart(
         "transcript": transcript,
         "options": {**options, "library": _texts(options.get("library"))},
     }
-    # The process writes its error output to a file, because a full pipe without a reader would
-    # block it.
+    # Error output goes to a file, because a full pipe without a reader would block the process.
     with tempfile.TemporaryFile() as said, _started(said) as process:
         try:
             _write(process, task)
@@ -160,8 +159,7 @@ def _write(process: subprocess.Popen[bytes], task: dict[str, Any]) -> None:
 def _messages(process: subprocess.Popen[bytes], cancel: Cancel | None) -> Iterator[dict[str, Any]]:
     """The messages of the process until it ends.
 
-    Raises: CancelledError: cancel() returned true. RecogniserError: no message for _PATIENCE
-    seconds."""
+    Raises: CancelledError: cancel() returned true. RecogniserError: no message for an hour."""
     lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     threading.Thread(target=_hand_over, args=(process.stdout, lines), daemon=True).start()
     heard = monotonic()
@@ -187,7 +185,7 @@ def _hand_over(pipe: IO[bytes], lines: queue.SimpleQueue[bytes]) -> None:
         for line in pipe:
             lines.put(line)
     except (OSError, ValueError):
-        pass  # the parent closed the pipe during the read
+        pass  # this process closed the pipe while the thread was reading
     lines.put(b"")
 
 

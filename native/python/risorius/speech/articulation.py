@@ -62,8 +62,7 @@ def viseme_weights(phonemes: Sequence[Phoneme], times: Times) -> Curves:
         strength, lead, lag = _DOMINANCE[viseme]
         first, last = np.searchsorted(times, (begin - _REACH, end + _REACH))
         t = times[first:last]
-        # The pull is strongest in the middle of the sound and decreases from there: a short sound
-        # pulls less.
+        # The pull is full in the middle half of the sound and decreases from there.
         middle, half = 0.5 * (begin + end), 0.25 * (end - begin)
         away = np.where(t < middle, (middle - half - t) / lead, (t - middle - half) / lag)
         pull[first:last, VISEMES.index(viseme)] += strength * np.exp(-np.clip(away, 0.0, None))

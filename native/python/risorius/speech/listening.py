@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the phonemes of a voice of any length: cuts it in pauses, and aligns or recognises the
-pieces."""
+"""Finds the phonemes of a voice: cuts it in pauses, and aligns or recognises the pieces."""
 
 from __future__ import annotations
 
@@ -25,11 +24,10 @@ STEP = 0.01
 
 _PIECE = 12.0  # seconds: smallest length of a piece, if pauses allow it
 _LONGEST_PIECE = 30.0  # seconds; limits the memory of the decoder
-_PAUSE = 0.15  # seconds of silence in which a cut is allowed
+_PAUSE = 0.15  # seconds: shortest silence in which the voice may be cut
 _SHORTEST_SILENCE = 0.08  # seconds: shorter silences are not removed from phonemes
-_SHORTEST_PHONEME = 0.03  # seconds
-# confidence below which a transcript is doubted: right ones reach 0.41 to 0.77, wrong ones up to
-# 0.35
+_SHORTEST_PHONEME = 0.03  # seconds: shortest length of a phoneme
+# confidence that makes a transcript doubtful: wrong ones reach 0.35, right ones 0.41 to 0.77
 _DOUBTFUL = 0.37
 _UNSAID = 0.2  # fraction of the speech that may be missing in the transcript
 # fraction of a transcript's words that must be heard; up to half are heard for a wrong transcript
@@ -54,7 +52,7 @@ class Heard(NamedTuple):
     samples: Samples
     """float32[n] at audio.RATE samples per second."""
     aligned: bool
-    """Whether the phonemes come from the transcript."""
+    """Whether the phonemes were aligned from the transcript, and not recognised."""
     notes: list[str]
     """Sentences about deviations, such as words of the transcript that were not heard."""
 

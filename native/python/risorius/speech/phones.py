@@ -22,8 +22,8 @@ class Phoneme(NamedTuple):
     name: str
     """Phoneme of the CMU dictionary, without stress: AA, B, ... ZH; SIL for silence."""
     confidence: float = 1.0
-    """Fraction of its duration, 0 to 1, in which a second decoder that knows only phonemes hears
-    the same viseme."""
+    """0 to 1. Aligned: fraction of its duration in which a decoder of phonemes hears the same
+    viseme. Recognised by vote: mean share of the votes for its viseme."""
     word: str = ""
     """The word that begins with this phoneme, or ""; it ends before the next word or SIL."""
 

@@ -105,7 +105,7 @@ def accents(phonemes: Sequence[Phoneme], samples: Samples, apart: float = 0.7) -
     if len(vowels) < 3:
         return []
     rows = np.array([_measure(p, levels, heights) for p in vowels])
-    # Vowels without a measurable pitch get the median pitch.
+    # Vowels without a measurable pitch get the median pitch of the others.
     usual = np.nanmedian(rows[:, 1]) if np.isfinite(rows[:, 1]).any() else 0.0
     rows[:, 1] = np.where(np.isfinite(rows[:, 1]), rows[:, 1], usual)
     spread = np.maximum(rows.std(axis=0), (1.0, 0.5, 0.02))

@@ -47,8 +47,7 @@ class MissingError(RisoriusError):
 
 
 class Segment(NamedTuple):
-    """A word, phoneme or silence from a decoder; times in seconds from the beginning of the
-    piece."""
+    """A word, phoneme or silence from a decoder; seconds from the beginning of the piece."""
 
     begin: float
     end: float
@@ -58,8 +57,7 @@ class Segment(NamedTuple):
 
 
 class Recogniser:
-    """PocketSphinx's decoders; each is made at first use, because loading the language model takes
-    a second."""
+    """PocketSphinx's decoders, made at first use, because their language model loads slowly."""
 
     def __init__(self) -> None:
         """Imports PocketSphinx. Raises: MissingError: it is not installed."""
@@ -177,8 +175,7 @@ def _decode(decoder: Any, pcm: bytes) -> None:
 
 
 def _phone_pass(decoder: Any, samples: Samples) -> list[Segment] | None:
-    """A second pass that times the phonemes within the words of the first pass; None if it
-    fails."""
+    """A second pass that times phonemes within the words of the first; None if it fails."""
     try:
         decoder.set_alignment()
         _decode(decoder, _pcm(samples))

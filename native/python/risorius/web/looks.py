@@ -21,8 +21,7 @@ from .textures import Textures, base_name, halved, media_type
 Pixels = npt.NDArray[np.uint8]
 
 _JPEG = "image/jpeg"
-# Role -> (pixels of the longest side, JPEG quality). Wrinkles are soft, and hair mostly has one
-# colour.
+# Role -> (pixels of the longest side, JPEG quality). Wrinkles are soft; hair has few colours.
 _SIZES = {
     "color": (1024, 82),
     "hair": (512, 75),
@@ -121,8 +120,7 @@ class _Finder:
         return found
 
     def _wrinkles(self, named: dict[str, str]) -> dict[str, Any]:
-        """Numbers of the wrinkle normals, one picture of all masks, and (animated map, tile,
-        channel)."""
+        """Numbers of wrinkle normals, one picture of all masks, (animated map, tile, channel)."""
         sets, offsets, maps = dict[int, int](), list[int](), list[list[int]]()
         tiles = list[Pixels]()
         for number in (1, 2, 3):

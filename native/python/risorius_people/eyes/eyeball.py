@@ -15,12 +15,12 @@ import numpy as np
 from ..polygons import Floats, Ints
 from ..source import BaseMesh
 
-MM = 0.01  # the data are in decimetres
+MM = 0.01  # decimetres per millimetre
 SEGMENTS = 48  # columns around the gaze
 # Radius of the iris in radii of the ball. People have 5.85 mm in 12 mm, but the lids of the data
 # fit a larger ball.
 IRIS = 0.395
-CORNEA = 4 / 3  # radius of the cornea / radius of the iris: 7.8 mm / 5.85 mm
+CORNEA = 4 / 3  # radius of the cornea divided by the radius of the iris: 7.8 mm / 5.85 mm
 PUPIL = 0.33  # radius of the pupil in room light, in radii of the iris
 CONVERGENCE = 1.2  # degrees by which each eye turns inwards, to look at a point 1.5 m away
 # Angle in radians between gaze and limbus, the iris' outer edge, at the middle of the ball.
@@ -32,7 +32,7 @@ _CLEAR = 0.0015  # gap between the cornea's shell and the ball, in radii of the 
 # middle and pupil, in radii of the iris.
 _IRIS_RINGS = np.array([0.0, 0.06, 0.16, 0.28, 0.42, 0.56, 0.70, 0.83, 0.93, 1.0])
 _ROOT, _MIDDLE, _RIM = 0.05, 0.13, 0.09
-_HOLE = 0.28  # depth of the pupil, in radii of the iris
+_HOLE = 0.28  # depth of the pupil behind the iris, in radii of the iris
 _BEHIND = np.array(
     [0.02, 0.06, 0.11, 0.17, 0.25, 0.35, 0.47, 0.60, 0.75, 0.92, 1.12, 1.4, 1.8, 2.25]
 )
@@ -109,8 +109,7 @@ class Revolved:
         return np.concatenate([rings.reshape(-1, 3), tips])
 
     def points(self) -> Floats:
-        """float64[vertices, 3]: positions in radii of the ball, with the gaze along +z; poles
-        last."""
+        """float64[vertices, 3]: positions in radii of the ball, gaze along +z; poles last."""
         return self._spread(self.away, self.along, [p[0] for p in self.poles if p])
 
     def uvs(self) -> Floats:

@@ -20,8 +20,7 @@ _EDGE = slice(ROOT, ROOT + len(_HEIGHTS))
 # Share of the rim's displacement that the rings outside the rim follow, from the rim outward.
 _FADE = np.array([0.85, 0.65, 0.45, 0.25, 0.1, 0.0, 0.0, 0.0])
 _STEPS = 10  # iterations that lay the rim on the eye
-# mm by which lids rise in a full look, because at half a look they move straight, not round the
-# ball
+# mm by which lids rise in a full look, because half a look moves them straight, not round the ball
 _LIFT = 0.38
 # Degrees by which a look at 1 turns an eye, and factor on the data's motion of the lids. The data's
 # eyes turn by a third of this, and their lower lids stay still.
@@ -194,8 +193,8 @@ def open_lids(lids: Lids, widen: Floats) -> Floats:
 
 
 def _lower_lid(grid: Floats) -> Floats:
-    """float64[13, COLUMNS, 1]: weight of the lower lid, 1 at the rim's middle, 0 at corners and
-    cheek."""
+    """float64[13, COLUMNS, 1]: the lower lid's weight, 1 at the rim's middle, 0 at the corners
+    and the cheek."""
     rows = np.ones(len(grid))
     rows[:ROOT] = np.linspace(0, 1, ROOT) ** 2
     columns = np.zeros(COLUMNS)
@@ -204,8 +203,7 @@ def _lower_lid(grid: Floats) -> Floats:
 
 
 def _lower_closed(lids: Lids) -> Floats:
-    """float64[13, COLUMNS, 3]: the grid with the lower lid raised to where it meets the upper
-    lid."""
+    """float64[13, COLUMNS, 3]: the grid with the lower lid raised to meet the upper lid."""
     grid = lids.grid(lids.rest)
     way = np.array([-0.7 * np.sign(lids.middle[0]), 0.7, 0.0]) * MM
     return np.asarray(grid + _lower_lid(grid) * way)

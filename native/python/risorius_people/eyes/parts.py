@@ -110,7 +110,7 @@ def _on_skin(rings: Ints, row: int, column: int) -> Row:
 
 
 def _rim(rings: Ints, at: float, column: int) -> Row:
-    """Weights of a point on a lid's rim.
+    """Weights of the base mesh's vertices for a point on a lid's rim.
 
     Args:
         rings: int64[13, COLUMNS], the rings of the eye.

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the lids of the base mesh as a grid: rings of skin around each eye, from cheek to
-socket."""
+"""Finds the lids of the base mesh as a grid: rings of skin around each eye."""
 
 from __future__ import annotations
 

@@ -52,8 +52,7 @@ def _lid_turn(places: Places, by: object) -> Floats:
 
 
 def _lid_press(places: Places, _: object) -> Floats:
-    """Presses both lids together, towards the nose and outwards, as if the eyes were shut
-    tightly."""
+    """Presses both lids together, towards the nose and outwards, as tightly shut eyes do."""
     upper, lower = places.lids["U"][:, None], places.lids["D"][:, None]
     turn = _lid_turn(places, 1) / 0.15
     inwards = np.zeros_like(turn)

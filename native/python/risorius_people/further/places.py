@@ -12,7 +12,7 @@ from risorius.base.easing import smooth_step
 from ..polygons import Floats, Ints
 from ..source import BaseMesh
 
-MM = 0.01  # the data are in decimetres
+MM = 0.01  # decimetres per millimetre
 _TOUCHING = 0.03  # decimetres: largest distance of a lip vertex from the other lip
 _PARTED = 0.04  # decimetres: smallest distance that the opening jaw adds
 _BETWEEN = 0.03  # decimetres: width of the blend between the lips at the corners
@@ -41,7 +41,7 @@ def nearest(points: Floats, others: Floats) -> tuple[Ints, Floats]:
 
 
 def bell(distance: Floats) -> Floats:
-    """A bell curve with value 1 at 0, float64[n].
+    """float64[n]: a bell curve with value 1 at distance 0.
 
     Args:
         distance: float64[n], in standard deviations.
@@ -109,8 +109,7 @@ def find_places(
     line = positions[_lip_line(positions, faces, groups["body"], jaw_open)]
     corner = np.abs(line[:, 0]).max()
     _, lip_distance = nearest(positions, line)
-    # A parabola of height over width, because the lips touch over some millimetres, not along a
-    # line.
+    # A parabola, because the lips touch over some millimetres, not along a line.
     height = np.polyfit(line[:, 0] ** 2, line[:, 1], 2)
     aside = np.minimum(np.abs(positions[:, 0]), corner)
     upper = smooth_step((positions[:, 1] - np.polyval(height, aside**2)) / _BETWEEN + 0.5)

@@ -193,8 +193,7 @@ class _Posed:
         return self._ground.normals(self._shaped) if is_shaped else self._ground.upright
 
     def _carried(self, strips: Strips) -> Floats:
-        """float64[n, rows, 2, 3]: left and right edges in the pose, moved as binding.py moves
-        cards."""
+        """float64[n, rows, 2, 3]: left and right edges in the pose, moved as in binding.py."""
         ground = self._ground
         roots = ground.roots(strips)
         was, now = (unit_vectors(roots.of(n)) for n in (ground.upright, self._turned))
@@ -238,8 +237,7 @@ class _Cutting:
         self.stays = np.ones(len(strips), bool)
 
     def cut(self, pose: _Posed, some: Ints) -> None:
-        """Shortens or drops the hairs with indices `some` that come too near to the skin in a
-        pose."""
+        """Shortens or drops the hairs `some` that come too near to the skin in a pose."""
         strips = self._strips
         for _ in range(_CUTS):
             some = some[_deep(pose.heights(strips.taken(some)), self._rest[some])]

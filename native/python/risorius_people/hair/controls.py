@@ -16,8 +16,7 @@ from risorius.base.easing import smooth_step
 
 from ..polygons import Floats
 
-# Control -> (half of the lid: -1 at the nose, 1 at the temple; shift of a hair's tip in hair
-# lengths).
+# Control -> (-1: half of the lid at the nose, 1: at the temple; shift of the tip in hair lengths).
 _WAYS = {
     "eyelashesUpIN": (-1, (0.0, 1.0, -0.3)),
     "eyelashesUpOUT": (1, (0.0, 1.0, -0.3)),
@@ -26,7 +25,7 @@ _WAYS = {
 }
 _LEAST_TURN = 4.0  # degrees: smaller missing rotations are ignored
 _LEAST_SHIFT = 1e-3  # centimetres: smaller displacements are ignored
-_REACH = 0.8  # factor on the tip's shift
+_REACH = 0.8  # factor on the shift of a hair's tip
 
 
 def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
@@ -58,7 +57,7 @@ def add_lash_controls(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
 
 
 def add_lid_turns(dna: Dna, mesh: Mesh, rows: int, lod: int) -> None:
-    """Adds shapes that rotate lashes about their roots by the lid's angle around the eye.
+    """Adds shapes that rotate lashes about their roots by the angle of the lid around the eye.
 
     Args:
         dna: face with joints of both eyes.

@@ -16,9 +16,9 @@ from .strips import Strips, joined, make_strips, unit
 from .surface import Surface, joined_roots
 
 _BROW_SPACING = 0.0115  # decimetres between the roots of two cards
-_BEARD_SPACING = 0.037  # decimetres
+_BEARD_SPACING = 0.037  # decimetres between the roots of two cards
 _OVER_LIP = 0.6  # factor on spacing and width of the beard's cards
-_LONGEST_OVER_LIP = 0.08  # decimetres
+_LONGEST_OVER_LIP = 0.08  # decimetres: longest hair above the lip
 _RIM = 0.010  # decimetres from the data's line of lashes to the outer rim of the lid
 # lid -> (number of cards, longest hair in decimetres)
 _LASHES = {"U": (48, 0.098), "D": (26, 0.044)}
@@ -116,7 +116,7 @@ def _grid(faces: Ints) -> Ints:
         k = known[0]
         a, b, c, d = (face[(k + i) % 4] for i in range(4))
         (ax, ay), (bx, by) = where[a], where[b]
-        way = (-(by - ay), bx - ax)  # to the left of the edge
+        way = (-(by - ay), bx - ax)  # the quad's other side is to the left of this edge
         where.setdefault(c, (bx + way[0], by + way[1]))
         where.setdefault(d, (ax + way[0], ay + way[1]))
     table = np.array(list(where.values()))
@@ -192,8 +192,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     density = beard_density(man, lips, style)
     over = _over_lip(man)
     spacing = _BEARD_SPACING * (1.0 if full else 0.8)
-    # Hair above the lip is short and fine, because long hair would enter the skin if the mouth
-    # moves.
+    # Hair above the lip is short, because long hair would enter the skin if the mouth moves.
     finer = surface.scattered(density * over, _OVER_LIP * spacing, random)
     roots = joined_roots([surface.scattered(density * ~over, spacing, random), finer])
     n = len(roots)
@@ -204,7 +203,7 @@ def beard(surface: Surface, lips: Floats, person: Person) -> Strips:
     length = long * (0.55 + 0.75 * under) * random.uniform(0.75, 1.2, n)
     length = np.where(lip, np.minimum(length, _LONGEST_OVER_LIP), length) * surface.scale
     length *= 0.5 + 0.5 * roots.of(density[:, None])[:, 0]
-    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # trimmed at the jaw's angle
+    length *= 0.55 + 0.45 * smooth_step((z + 0.6) / 0.3)  # shorter at the angle of the jaw
     flow = _beard_flow(man) + 0.22 * random.normal(0, 1, man.shape)
     rise = np.radians(random.uniform(28, 50, n)), np.radians(random.uniform(2, 25, n))
     rows = 3 if full else 2

@@ -29,7 +29,7 @@ from .strips import Strips
 from .surface import Surface
 
 PICTURE = "hair_color.png"
-NO_HAIR = 4  # the first LOD without cards
+NO_HAIR = 4  # number of the first LOD without hair cards
 _SHARES = (1.0, 0.42, 0.2, 0.1)  # fraction of the strips that is kept at each LOD
 # More brows are kept, because wide cards would look like dashes while the face is still large.
 _BROWS = (1.0, 0.75, 0.3, 0.1)
@@ -48,8 +48,7 @@ _PITCH = 2.4  # distance between turns, in radii of the coil, for hair_curl 1
 
 @dataclass
 class Grown:
-    """The hair of a person: mesh (hair, brows, beard, eyelashes) -> strips, for the meshes that the
-    person has."""
+    """The hair of a person: mesh (hair, brows, beard, eyelashes) -> strips, if there are any."""
 
     strips: dict[str, Strips]
     unit: float  # length of a decimetre in the unit of the Dna's meshes

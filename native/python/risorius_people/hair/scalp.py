@@ -171,7 +171,7 @@ def afro(surface: Surface, person: Person) -> Strips:
     length = 0.42 * person.hair_length * surface.scale * random.uniform(0.75, 1.15, n)
     length *= 0.35 + 0.65 * smooth_step(inside / 0.22)
     flow = tangent(random.normal(0, 1, surface.man.shape), surface.normals)
-    # An upright card is visible as an edge, so cards at the hairline, with little hair around, lie
+    # The edges of upright cards are visible at the hairline, with little hair around: they lie
     # flat.
     upright = np.zeros(n) if short else smooth_step((inside - 0.03) / 0.15)
 
@@ -194,8 +194,7 @@ def afro(surface: Surface, person: Person) -> Strips:
     turns = between((-16, 16), (0, 180))
     taper = np.array([0.7, 1.0, 1.1, 0.95])[-rows:]
     strips = make_strips(points, out, half, taper, _tiles(inside, random, 0.05), roots, turns)
-    # A frown moves the forehead's skin, so cards are narrow there to keep their edges above the
-    # skin.
+    # A frown moves the forehead's skin; narrow cards keep their edges above the skin there.
     strips.sides[:, 0] *= (0.5 + 0.5 * smooth_step(inside / 0.15))[:, None]
     return strips
 
@@ -237,8 +236,7 @@ def long(surface: Surface, person: Person) -> Strips:
 
 
 def _fringe(surface: Surface, person: Person, rows: int, random: np.random.Generator) -> Strips:
-    """A fringe: hair that grows behind the hairline, falls over the forehead, and ends in a
-    line."""
+    """A fringe: hair from behind the hairline that falls over the forehead to a line."""
     man = surface.man
     inside = hairline_height(man, *HAIRLINES[person.hair_style])
     x, y, z = man.T

@@ -45,7 +45,7 @@ class Strips:
 
     @property
     def rows(self) -> int:
-        """Number of points per guide."""
+        """Number of points of a guide."""
         return int(self.points.shape[1])
 
     def taken(self, chosen: Ints) -> Strips:
@@ -99,8 +99,7 @@ def make_strips(
     """
     way = unit(np.gradient(points, axis=1))
     side = unit(np.cross(way, outside))
-    # If a hair crosses the outward direction, its left side flips; without this correction the card
-    # would fold.
+    # If a hair crosses the outward direction, its left side flips, and the card would fold.
     along = np.sign((side[:, 1:] * side[:, :-1]).sum(axis=2, keepdims=True))
     side[:, 1:] *= np.cumprod(np.where(along < 0, -1, 1), axis=1)
     if turns is not None:
@@ -127,8 +126,7 @@ def joined(parts: list[Strips]) -> Strips:
 
 
 def card_vertices(strips: Strips) -> tuple[Floats, Floats]:
-    """Positions and normals, float64[V, 3] each: left and right edge of each row, strip by
-    strip."""
+    """Positions and normals, float64[V, 3] each: left and right edge row by row, strip by strip."""
     left, right = strips.points + strips.sides, strips.points - strips.sides
     positions = np.stack([left, right], axis=2).reshape(-1, 3)
     normals = np.repeat(strips.normals.reshape(-1, 3), 2, axis=0)
@@ -136,8 +134,7 @@ def card_vertices(strips: Strips) -> tuple[Floats, Floats]:
 
 
 def card_faces(strips: Strips) -> tuple[list[list[int]], Floats]:
-    """Vertex indices of faces, counter-clockwise from outside; float64[V, 2], texture
-    coordinates."""
+    """Vertices of faces, counter-clockwise from outside; float64[V, 2], texture coordinates."""
     n, rows = len(strips), strips.rows
     first = 2 * (np.arange(n)[:, None] * rows + np.arange(rows - 1)).reshape(-1)
     faces = np.stack([first + 1, first, first + 2, first + 3], axis=1)

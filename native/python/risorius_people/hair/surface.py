@@ -178,8 +178,7 @@ def nearest_places(
 
 
 def _apart(points: Floats, density: Floats, spacing: float) -> Ints:
-    """Indices of points that keep the smallest distance from each other; earlier points have
-    priority."""
+    """Indices of points that are not too near to each other; earlier points have priority."""
     reach = (spacing / np.sqrt(np.maximum(density, 1e-6))) ** 2
     keep = np.zeros(0, np.int64)
     rest = np.flatnonzero(density > 0.02)

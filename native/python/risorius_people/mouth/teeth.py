@@ -108,7 +108,8 @@ class Arch:
         self.up = up * normal * np.sign(normal[1])
 
     def at(self, way: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points, directions along the arch to the character's left, and directions to the lips.
+        """Frames of the arch: points, directions along it to the character's left, directions to
+        the lips.
 
         Args:
             way: float64[n], decimetres along the arch from the middle, positive on the left.
@@ -201,8 +202,7 @@ def arches(base: BaseMesh) -> dict[str, Arch]:
         used = np.unique([c[0] for f in base.faces[f"helper-{name}-teeth"] for c in f])
         p = base.positions[used]
         half = p[p[:, 0] > -1e-6]
-        # The edge is the outermost row on the biting side: vertices near an inclined plane below
-        # all others.
+        # The edge is the outermost row on the biting side, found by an inclined plane through it.
         edge = half
         for _ in range(6):
             slope = np.polyfit(edge[:, 2], edge[:, 1], 1)[0]

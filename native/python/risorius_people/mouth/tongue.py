@@ -17,7 +17,7 @@ OUT = "tongueOut"
 # Controls that lift the middle of the lower lip further than the open jaw lowers the tongue.
 LIFTING = ("mouthCornerPull", "mouthPressD", "jawChinRaiseD")
 _JAW = 0.08  # lift of the tongue with an open jaw, because the data's tongue would lie in the lip
-_BEHIND = 0.22  # distance behind the lip at which the tongue begins to rise
+_BEHIND = 0.22  # decimetres behind the lip from which the tongue rises
 _EVEN = 0.05  # width across the mouth over which the lip's lift is averaged
 
 
@@ -47,8 +47,7 @@ def over_lip(
 
 
 def _up(positions: Floats, vertices: Ints, lift: Floats) -> Floats:
-    """float64[V, 3]: a lift along y. Args: positions: float64[V, 3]; vertices: lifted; lift: per
-    vertex."""
+    """float64[V, 3]: `lift` along y. Args: positions: float64[V, 3]; vertices: with a lift each."""
     out = np.zeros_like(positions)
     out[vertices, 1] = lift
     return out

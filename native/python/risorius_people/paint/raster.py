@@ -7,7 +7,7 @@ import numpy as np
 
 from ..polygons import Floats, Ints, Polygons
 
-_AT_ONCE = 1 << 20  # texels per block
+_AT_ONCE = 1 << 20  # largest number of texels that are searched together
 
 
 class Raster:
@@ -157,8 +157,7 @@ def _halves(whole: Floats) -> Floats:
 
 
 def _filled(image: Floats, share: Floats) -> Floats:
-    """Means of the covered texels; a texel without them takes the value of the next coarser
-    level."""
+    """Means of covered texels; a texel without them takes the next coarser level's value."""
     mean = image / np.maximum(share, 1e-6)
     bare = share == 0
     if min(image.shape[:2]) < 2 or not bare.any():

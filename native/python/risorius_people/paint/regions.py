@@ -52,7 +52,7 @@ class Face:
 
     @property
     def aside(self) -> Floats:
-        """float64[V]: |x|."""
+        """float64[V]: distance from the middle of the face, |x|."""
         return np.abs(self.x)
 
     def spot(self, x: float, y: float, wide: float, high: float) -> Floats:
@@ -214,8 +214,7 @@ def blood(face: Face, age: int) -> Floats:
 
 
 def shade_of_eyes(face: Face) -> Floats:
-    """Mask of the dark skin under the eyes, where veins show, 0 to 1, from the inner corner
-    outward."""
+    """Mask of the dark skin under the eyes, where veins show, 0 to 1."""
     along = np.clip((face.aside - 0.13) / 0.30, 0, 1)
     rim = -0.15 - 0.075 * np.sin(np.pi * np.clip(along * 0.9 + 0.05, 0, 1))
     away = np.abs(face.y - rim) / 0.062
@@ -232,7 +231,7 @@ def yellow(face: Face) -> Floats:
 
 
 def beard(face: Face) -> Floats:
-    """Density of the beard's roots, 0 to 1, with a loose edge."""
+    """Density of the beard's roots, 0 to 1, with an uneven edge."""
     x, y, z = face.aside, face.y, face.z
     line = np.interp(
         x, (0.0, 0.17, 0.3, 0.45, 0.6, 0.72), (-0.53, -0.56, -0.70, -0.66, -0.45, -0.2)

@@ -48,8 +48,7 @@ def depth_of(person: Person) -> float:
 
 
 def _hairline(face: regions.Face, person: Person) -> Floats:
-    """float64[V]: distance inside the hairline in decimetres, smaller where hair is sparse; ears
-    are outside."""
+    """float64[V]: distance inside the hairline in decimetres, less for sparse hair; not on ears."""
     at = np.column_stack([face.x, face.y, face.z])
     inside = hairline_height(at, *HAIRLINES[person.hair_style])
     ear = smooth(0.8, 0.86, face.aside) * (1 - smooth(0.35, 0.45, face.y))
@@ -236,8 +235,7 @@ class Skin:
         roots, at = texels.dots(3.4, 31)
         dark = roots.over(0.9 * scalp, at, 0.5)
         shadow = person.scalp * scalp * (0.78 + 0.08 * texels.middle) + 0.2 * person.scalp * dark
-        # The shadow is a product of powers, because light passes between hairs and each absorbs a
-        # share.
+        # A product of powers, because light passes between hairs and each absorbs a share.
         deep = (np.clip(shadow, 0, 0.95) * scalp).astype(np.float32)[:, None]
         light = light ** (1 - deep) * np.maximum(hair, 1e-3).astype(np.float32) ** deep
         if person.beard_style != "none":  # roots between the beard's cards

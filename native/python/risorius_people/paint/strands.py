@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Paints the hairs on cards of scalp, brows, lashes and beard: colour and opacity in one
-texture."""
+"""Paints the hairs on cards of scalp, brows, lashes and beard, with their opacity."""
 
 from __future__ import annotations
 
@@ -96,8 +95,7 @@ def _paint_tile(
     grey: float,
     random: np.random.Generator,
 ) -> Floats:
-    """float64[height, width, 4]: a tile of hairs from the root (row 0) to the tip; later hairs are
-    on top."""
+    """float64[height, width, 4]: a tile of hairs from root (row 0) to tip; later ones on top."""
     width, height = size
     image = np.zeros((height, width, 4))
     v = (np.arange(height) + 0.5) / height
@@ -115,8 +113,7 @@ def _paint_tile(
         s = np.clip((v - begin) / (length - begin), 0, 1)
         lean, bend = random.normal(0, hairs.lean), random.normal(0, hairs.bend)
         start = aside + (1 - 2 * aside) * place
-        # A hair that leaves the tile would be cut off in a straight line, so it leans the other
-        # way.
+        # A hair that leaves the tile would be cut in a straight line, so it leans the other way.
         if abs(start + lean + bend - 0.5) > 0.5 - aside:
             lean, bend = -lean, -bend
         middle = start + lean * s + bend * s**2

@@ -16,8 +16,7 @@ KINDS = ("minimal", "mixamo")
 _HEAD_HEIGHT = 1.5  # metres: the assumed height of a head whose joint is near the origin
 _STANDING = (0.8, 2.4)  # metres: a head's joint between these heights is above a ground at 0
 _STRAIGHT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# Axes of Mixamo's bones (columns: x, y, z of the bone), with y along the bone, for TalkingHead's
-# poses.
+# Axes of Mixamo's bones, which TalkingHead's poses need. Columns: the bone's x, y (along it), z.
 _TURNS = {
     "": _STRAIGHT,
     "arm left": ((0, 1, 0), (0, 0, -1), (-1, 0, 0)),
@@ -54,7 +53,7 @@ _SIDES = {"left": 1.0, "right": -1.0}
 
 @dataclass(frozen=True)
 class Bone:
-    """A bone of a humanoid.
+    """A bone of a humanoid: its names, parent, and position in a body whose head has height 1.
 
     Attributes:
         name: VRM 1.0 name.
@@ -155,8 +154,7 @@ def wanted(own: Iterable[str], kind: str) -> list[str]:
 
 
 def parent_of(name: str, there: list[str]) -> str:
-    """The nearest ancestor that exists; "" for the hips. Args: name: bone; there: existing
-    bones."""
+    """The nearest ancestor in `there`; "" for the hips. Args: name: bone; there: bones."""
     above = BONES[name].parent
     while above and above not in there:
         above = BONES[above].parent

@@ -54,7 +54,7 @@ def read(path: Path, version: str) -> dict[str, Any]:
     """Reads and checks a TOML file with a licence.
 
     Args:
-        path: of the file.
+        path: path of the file.
         version: one of VERSIONS.
 
     Raises:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables that make a glTF a VRM: humanoid, expressions, look-at, first person, licence."""
+"""Makes the tables of a VRM: humanoid, expressions, look-at, first person, licence."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Manner:
 
 @dataclass(frozen=True)
 class Shown:
-    """A mesh of the file.
+    """A mesh of the file, its morph targets, and whether the wearer sees it.
 
     Attributes:
         node, mesh: numbers of its node and mesh.

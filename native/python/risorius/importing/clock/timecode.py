@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SMPTE timecodes HH:MM:SS:FF, with fractions of a frame, drop-frame or not."""
+"""Reads SMPTE timecodes HH:MM:SS:FF, drop-frame or not, whose frames may have fractions."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy.typing as npt
 from ..errors import AnimationFileError
 
 BASES = (24, 25, 30, 48, 50, 60, 100, 120)  # frames per second that timecodes count
-PHONES = (30, 60)  # the frame rates of nearly all phones
+PHONES = (30, 60)  # frames per second of nearly all phones
 DAY = 86400.0
-# A ; or , as the last separator means drop-frame, as in edit lists.
+# A ; or , before the frame number means drop-frame, as in edit lists.
 _FORM = re.compile(r"(\d{1,2})[:;](\d{1,2})[:;](\d{1,2})([:;,])(\d{1,3}(?:\.\d*)?)")
 
 
@@ -29,7 +29,7 @@ class Timecode(NamedTuple):
 
 
 def parse(text: str, name: str, line: int, column: int | str) -> Timecode:
-    """A timecode HH:MM:SS:FF, whose frame may have a fraction.
+    """Parses a timecode HH:MM:SS:FF, whose frame number may have a fraction.
 
     Args:
         text: the cell; ; or , before the frame means drop-frame.
@@ -75,7 +75,7 @@ def infer_base(codes: Sequence[Timecode]) -> int | None:
         return measured
     if largest >= 30:
         return 60 if largest < 60 else None
-    # Frame 29 is the highest, and the take is so long that at 60 frames it would go beyond 29.
+    # At 60 frames per second, a take of 2 s would have frame numbers above 29.
     if len(codes) > 1 and largest == 29 and seconds[-1] - seconds[0] >= 2:
         return 30
     return None
@@ -120,11 +120,11 @@ def seconds_of(codes: Sequence[Timecode], base: int, is_true_rate: bool) -> npt.
     """
     hours, minutes, secs, frames, dropped = np.array(codes, np.float64).reshape(-1, 5).T
     count = (3600.0 * hours + 60.0 * minutes + secs) * base + frames
-    # Drop-frame skips the first two numbers (of 30) of each minute except every tenth.
+    # Drop-frame skips the first 2 of 30 frame numbers (4 of 60) in each minute except every tenth.
     total = 60.0 * hours + minutes
     count -= dropped * (base // 15) * (total - np.floor(total / 10.0))
     seconds = count / base * (1.0 if is_true_rate and not dropped.any() else 1.001)
-    # A step back by more than 12 hours is midnight; a smaller one is a row out of order, and is
+    # A step back by more than 12 hours is midnight; smaller ones are rows out of order, and are
     # kept.
     wraps = np.concatenate([[0.0], np.diff(seconds) < -0.5 * DAY])
     length = DAY if not dropped.any() else float((24 * 60 * 60 * base - 2592 * (base // 30)) / base)

@@ -20,7 +20,7 @@ EXTENSION = "KHR_draco_mesh_compression"
 
 
 class MissingDracoError(RisoriusError):
-    """The package DracoPy is not installed."""
+    """A mesh is packed with Draco, but the package DracoPy is not installed."""
 
     code = "missing_draco"
 

@@ -14,7 +14,7 @@ from ...base.given import GivenError, shown, text, whole
 EXTENSIONS = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 MODES = ("ATTRIBUTES", "TRIANGLES", "INDICES")
 FILTERS = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL")
-_WIDEST = 256  # bytes in a row
+_WIDEST = 256  # largest number of bytes per row
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Packing:
 
     @property
     def size(self) -> int:
-        """Bytes after unpacking."""
+        """Number of bytes after unpacking."""
         return self.count * self.stride
 
 
 def packing_of(view: Mapping[str, Any]) -> Packing | None:
-    """The packing of a buffer view, or None if it is not packed.
+    """Reads how a buffer view is packed; None if it is not packed.
 
     Args:
         view: the buffer view's table in the JSON.

@@ -60,7 +60,7 @@ class Facts:
         return sum(int(np.count_nonzero(group.values)) for group in self.dna.joint_groups)
 
     def region_counts(self) -> dict[str, int]:
-        """Number of joints of each non-empty region, in the order of REGIONS."""
+        """Region -> number of its joints, for regions with joints, in the order of REGIONS."""
         votes = Counter(self.joint_regions)
         return {region: votes[region] for region in REGIONS if votes[region]}
 
@@ -89,7 +89,7 @@ def gather(dna: risorius.Dna, data: bytes, file_name: str, title: str | None = N
 
 
 def listed(mapping: risorius.LodMapping, lod: int) -> npt.NDArray[np.int64]:
-    """int64[listed]: the indices that a mapping lists for `lod`; empty if it lacks this LOD."""
+    """int64[n]: the indices that a mapping lists for `lod`; empty if it lacks this LOD."""
     return np.asarray(mapping[lod] if lod < len(mapping) else [], np.int64)
 
 

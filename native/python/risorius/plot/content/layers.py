@@ -96,7 +96,7 @@ def read_layers(data: bytes) -> list[Layer]:
 
 def _sections_of_2_1(data: bytes) -> list[Layer]:
     offsets = struct.unpack_from(">8I", data, 7)
-    # The third offset is for "behavior", which has no bytes of its own.
+    # The third offset, of "behavior", is skipped, because that section has no bytes of its own.
     starts = [offsets[0], offsets[1], *offsets[3:8], len(data) - 3]
     layers = [Layer("", "header", 0, 39)]
     for title, (start, end) in zip(_SECTIONS_OF_2_1, pairwise(starts), strict=True):

@@ -20,8 +20,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cells:
-    """Non-zero coefficients: row, column and joint group of each, int64[N], in a grid of
-    `shape`."""
+    """Row, column and joint group of each non-zero coefficient, int64[N], in a grid of `shape`."""
 
     rows: Ints
     columns: Ints
@@ -56,11 +55,10 @@ def group_regions(dna: risorius.Dna, joint_regions: Sequence[str]) -> list[str]:
 
 
 def shape_of(dna: risorius.Dna, controls: int) -> tuple[int, int]:
-    """(rows, columns) that contain all coefficients of dna: at least 9 per joint, and
-    `controls`."""
+    """(rows, columns) that contain all coefficients of dna; at least 9 per joint and `controls`."""
     rows, columns = 9 * len(dna.joint_names), controls
     for group in dna.joint_groups:
-        # 64-bit, because -1 as an unsigned 16-bit number would be 65,535.
+        # Converted to 64 bits, because -1 as an unsigned 16-bit number would be 65,535.
         rows = max(rows, int(np.max(group.output_indices.astype(np.int64), initial=-1)) + 1)
         columns = max(columns, int(np.max(group.input_indices.astype(np.int64), initial=-1)) + 1)
     return rows, columns

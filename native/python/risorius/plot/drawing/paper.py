@@ -19,7 +19,7 @@ from matplotlib.figure import FigureBase
 
 from ..content.regions import COLORS
 
-# The page finds these exact values in the SVG text and replaces them with its theme's variables.
+# page.py replaces these exact values in the SVG text by variables of its theme.
 INK = "#1d232b"
 MUTED = "#66707d"
 RULE = "#d4dae1"
@@ -67,14 +67,13 @@ def settings() -> Iterator[None]:
 
 
 def rgb(region: str) -> npt.NDArray[np.float64]:
-    """The colour of a region: float64[3] in 0..1."""
+    """float64[3] in 0..1: the colour of a region."""
     return np.array(to_rgb(COLORS[region]))
 
 
 @dataclass(frozen=True)
 class Canvas:
-    """A figure, or a part of one, with its size in inches, so that distances are independent of
-    it."""
+    """A figure, or a part of one, and its size in inches, in which drawings measure distances."""
 
     figure: FigureBase
     width: float

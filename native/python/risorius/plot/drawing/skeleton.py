@@ -78,7 +78,7 @@ def world_positions(dna: risorius.Dna) -> Floats:
     positions, turns = _rows(dna.neutral_joint_translations, len(above)), rotations(dna)
     done = above == np.arange(len(above))
     while not done.all():
-        # One generation at a time, because a face's hierarchy is wide and shallow.
+        # All joints of one generation together, because a face's hierarchy is wide and shallow.
         ready = ~done & done[above]
         if not ready.any():
             break  # parents form a cycle: their joints keep local positions
