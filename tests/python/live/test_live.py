@@ -652,7 +652,7 @@ def test_neutral_now_and_gains():
     assert values["CTRL_expressions.eyeBlinkL"] == 0.0
     shaper.gains = {"jawOpen": 0.25}
     got = shaper.apply(frame_of(jawOpen=1.0, head__yaw=0.3, eyeBlinkLeft=1.0))
-    assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is still reached
+    assert got.values.tolist() == pytest.approx([0.5, 0.0, 1.0])  # clamped; 1 is reached
 
 
 def test_gains_leave_shut_lips_shut():

@@ -94,7 +94,7 @@ def test_guides_stay_over_the_skin_and_are_as_long_as_asked(ball):
     corners = positions[np.array(faces)]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0])
     middles = corners.mean(axis=1)
-    outward = (facing * middles).sum(axis=1)  # counter-clockwise seen from outside
+    outward = (facing * middles).sum(axis=1)  # positive: counter-clockwise
     assert outward[middles[:, 1] > -0.8].min() > 0  # below -0.8 hairs of all directions meet
 
 

@@ -113,7 +113,7 @@ def _tongue_in_lip(dna, poses):
     rest = posed(head, {})
     wide, _, front = posed(tongue, {}).max(axis=0)
     near = (np.abs(rest[:, 0]) < 0.5 * wide) & (np.abs(rest[:, 2] - front) < 15)
-    lower = near & (rest[:, 1] - posed(head, {"jawOpen": 1})[:, 1] > 10)  # what the jaw takes along
+    lower = near & (rest[:, 1] - posed(head, {"jawOpen": 1})[:, 1] > 10)  # moved by the jaw
     out = []
     for values in poses:
         lip, points = posed(head, values)[lower], posed(tongue, values)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The self-test of the wheel: it passes here and reports planted faults."""
+"""The self-test of the wheel passes, and reports faults that the test plants."""
 
 import subprocess
 import sys
