@@ -55,7 +55,7 @@ def matrix(dna, lod, width=None):
 
 
 def turns(dna, lod):
-    """{joint: [(control, angles), ...]}: the product of each quaternion, factor by factor."""
+    """{joint: [(control, angles), ...]}: factors of each joint's quaternion, in order."""
     out = {}
     for group in dna.joint_groups:
         found, order = {}, oracle.column_order(dna, group)
@@ -97,7 +97,7 @@ def giant(dna):
 
 
 def scattered(dna, seed):
-    """Each row in one of many groups of the same LODs, with columns in any order."""
+    """The face with rows spread over many groups of equal LODs, and columns in random order."""
     rng = np.random.default_rng(seed)
     out, groups = copy.deepcopy(dna), []
     for group in dna.joint_groups:
@@ -329,7 +329,7 @@ def test_products_of_quaternions_stay_in_their_order(case):
 
 
 def face_of_regions(seed, regions=6, joints=12, controls=20):
-    """Dense regions of joints, shuffled, in one group; small values that do not belong there."""
+    """One group with dense regions of joints in random order, and small values elsewhere."""
     rng = np.random.default_rng(seed)
     count = regions * joints
     owner = rng.permutation(np.repeat(np.arange(regions), joints))

@@ -76,7 +76,7 @@ def resting(dna):
 
 
 def head_matrix(yaw, pitch, roll):
-    """Yaw to the face's left, then pitch up, then roll to its left shoulder; x left, z up."""
+    """The rotation of yaw to the face's left, pitch up, and roll to its left shoulder."""
     return about((0, 0, 1), yaw) @ about((-1, 0, 0), pitch) @ about((0, 1, 0), roll)
 
 
@@ -139,7 +139,7 @@ def test_a_clips_head_fires_the_neck_poses_of_each_frame(tmp_path):
 
 
 def neck_face(folder):
-    """The face whose last joint is the second of the neck: it takes half of the neck's turn."""
+    """A face whose last joint is neck_02, which takes half of the neck's rotation."""
     dna = face()
     dna.joint_names = ["spine", "neck_01", "neck_02"]
     dna.raw_control_names = ["jaw", *(f"neck_02.q{part}" for part in PARTS)]

@@ -71,7 +71,7 @@ class Face:
         return out
 
     def stretched(self, record):
-        """Joints of setups whose rotation is no unit: their angles are not their quaternion."""
+        """Joints of setups whose input is no unit quaternion, so their angles differ."""
         layer, controls = self.dna.twist_swing_behavior, self.expected_controls(record)
         out = []
         for s in (*layer.twists, *layer.swings):
@@ -423,7 +423,7 @@ def test_a_read_only_view_of_what_others_may_write_is_copied():
     raw = random_raw(np.random.default_rng(3), dna)
     data = np.frombuffer(rig.to_bytes(), np.uint8)
     space = np.empty(len(data) + 64, np.uint8)
-    owner = space[-space.ctypes.data % 64 :][: len(data)]  # where a view could be used in place
+    owner = space[-space.ctypes.data % 64 :][: len(data)]  # aligned: a view is possible
     owner[:] = data
     again = risorius.Rig.from_bytes(memoryview(owner).toreadonly())
     owner[:] = 0

@@ -133,7 +133,7 @@ def test_another_file_option_or_version_is_another_face(tmp_path, monkeypatch, n
         risorius.compile_cached(GOLDEN / "units.dna", tmp_path)
     for module, name, value in (
         (cache, "rig_block_version", lambda: 0),
-        (cache, "compile_version", lambda: 1),  # quaternion columns in the order of the file
+        (cache, "compile_version", lambda: 1),  # another version of the compiler
         (cache.version, "__version__", "0.0.0"),
         (sys, "byteorder", "middle"),
     ):

@@ -35,7 +35,7 @@ def feeds(dna, lod):
 
 
 def graph_feeds(kind, lod):
-    """Each scatter, with all that the operations before it gather."""
+    """For each scatter operation: the controls that it depends on, and those it writes."""
     reads, pairs = {}, []
     for s, operations in enumerate(kind.operations):
         for o in oracle_behavior.listed(kind.lod_operation_mappings[s], lod):
@@ -75,7 +75,7 @@ def driven_controls(dna, lod, control):
 
 
 def driven_joints(dna, lod, controls, stride):
-    """bool[J, stride]: all rows of a group; rotations as a whole where they may be quaternions."""
+    """Attributes that the controls may change, bool[J, stride]; rotations as a whole."""
     out = np.zeros((len(dna.joint_names), stride), bool)
     rotation = slice(3, stride - 3)
     for group in dna.joint_groups:

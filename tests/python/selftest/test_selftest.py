@@ -33,7 +33,7 @@ def test_it_passes_here_with_every_instruction_set():
 
 
 def test_the_values_are_those_of_the_reference_at_every_lod():
-    """The faces are files of tests/data/golden, byte for byte, and all their parts are compared."""
+    """The faces equal files of tests/data/golden, and all their outputs are compared."""
     golden = PROJECT / "tests" / "data" / "golden"
     for name, source in (("core", "core"), ("units", "units"), ("solvers", "tiny_v28")):
         assert checks.content(f"{name}.dna") == (golden / f"{source}.dna").read_bytes()

@@ -183,7 +183,7 @@ def test_partners_change_as_readily_as_the_readier_one(face, eases):
 
 
 def test_of_opposites_one_alone_is_used(face):
-    """The left smile and the puff both bring this vertex up; together they fit a little better."""
+    """The left smile and the puff both raise this vertex; both together fit slightly better."""
     surface, vertex = face[1], 14 * 5 + 6
     target = surface.positions(raw(left=0.5, puff=0.4), 0, [vertex])
     drag = [(0, vertex)], target
@@ -290,7 +290,7 @@ def test_a_sparse_drag_leaves_what_belongs_elsewhere(face):
     given = {"ease": ease, "method": "sparse"}
     near = risorius.solve_drag(surface, raw(), [(0, vertex)], target, **given)
     assert near.raw[JAW] == 0 < near.raw[TWIN]
-    alone = np.isin(np.arange(7), [JAW, IDLE, PUFF])  # what reaches nothing asks the jaw
+    alone = np.isin(np.arange(7), [JAW, IDLE, PUFF])  # idle cannot help: the jaw does
     helped = risorius.solve_drag(surface, raw(), [(0, vertex)], target, free=alone, **given)
     assert helped.raw[JAW] == pytest.approx(0.4, abs=0.02)
 

@@ -328,7 +328,7 @@ def test_listening_tells_how_far_it_is_and_can_be_cancelled(voice):
 
 
 def test_phonemes_of_a_piece_lie_on_the_clock_of_the_whole_and_end_with_it():
-    heard = [Phoneme(0.0, 0.5, "AA"), Phoneme(0.5, 1.1, "P")]  # the last one a little too long
+    heard = [Phoneme(0.0, 0.5, "AA"), Phoneme(0.5, 1.1, "P")]  # the last one is too long
     found = _shifted(heard, 2.0, 3.0)
     assert found == [Phoneme(2.0, 2.5, "AA"), Phoneme(2.5, 3.0, "P")]
 
@@ -415,7 +415,7 @@ def test_weights_are_parts_of_a_whole_and_rounding_is_anticipated():
 
 def test_vowels_change_what_a_consonant_looks_like():
     def rounding(*sounds):
-        return animate(spell(*sounds)).curve(P + "mouthLipsPurseUL")[15]  # amid the consonant
+        return animate(spell(*sounds)).curve(P + "mouthLipsPurseUL")[15]  # inside the consonant
 
     assert rounding("UW", "UW", "T", "UW", "UW") > 0.2
     assert rounding("IY", "IY", "T", "IY", "IY") < 0.02
@@ -437,7 +437,7 @@ def test_curves_are_smooth_and_in_range():
             assert curve.min() >= 0.0
             assert curve.max() <= 1.0
         turns = np.abs(np.diff(curve, 2)).max()
-        assert turns < 0.006, name  # twice that where sounds meet, if nothing rounds them off
+        assert turns < 0.006, name  # without rounding, twice as much
 
 
 def test_intensity_scales_shapes_but_not_closures():

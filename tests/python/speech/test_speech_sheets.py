@@ -41,7 +41,7 @@ def test_what_was_written_is_read(name):
 
 
 def test_files_of_praat_and_of_aligners_are_read():
-    """Short form, UTF-16, stress, a tier of points, other names of tiers, gaps, comments."""
+    """TextGrid in short form and UTF-16, with stress, points, other tier names and gaps."""
     short = """File type = "ooTextFile"
         "TextGrid" 0 0.8 <exists> 3
         "TextTier" "clicks" 0 0.8 1 0.4 "here" ! nobody asks

@@ -71,7 +71,7 @@ def live_link_face(
 
 
 def capture(count: int, names: list[str] = COLUMNS) -> np.ndarray:
-    """Values [count, names] of 10 decimals, each column another; rotations to 0.6 both ways."""
+    """Values [count, names] with 10 decimals, different per column; rotations within 0.6."""
     at = np.arange(count)[:, None]
     column = np.arange(len(names))[None, :]
     values = 0.5 + 0.5 * np.sin(0.11 * at + 0.7 * column)
@@ -217,7 +217,7 @@ def papagayo_pgo_json() -> str:
 
 
 def moho_dat() -> str:
-    """The same words as Papagayo exports them: frames from 1, a rest at the end of each pause."""
+    """The same words in Papagayo's export for Moho: frames from 1, a rest ends each pause."""
     rows = [
         "1 rest",
         "6 rest",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command line in this process: a process of its own takes longer to start than to work."""
+"""Runs the command line inside this process, because a new process starts slowly."""
 
 from __future__ import annotations
 

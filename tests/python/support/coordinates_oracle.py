@@ -103,7 +103,7 @@ def order_stays(source, target):
 
 
 def local_matrices(dna, deltas=None):
-    """float64[joints, 4, 4]: scale, then rotate, then translate, relative to the parent.
+    """Matrices relative to the parents, float64[joints, 4, 4]: scale, rotate, translate.
 
     deltas: joints of a pose, float[joints, 9], added to the neutral pose.
     """
@@ -124,7 +124,7 @@ def local_matrices(dna, deltas=None):
 
 
 def world_matrices(dna, deltas=None):
-    """float64[joints, 4, 4]; parents may come after their children."""
+    """World matrices, float64[joints, 4, 4]; parents may come after their children."""
     local = local_matrices(dna, deltas)
     parents = np.asarray(dna.joint_parents)
     world = [None] * len(local)

@@ -135,7 +135,7 @@ def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> S
 
 
 def _with_closures(samples, rate, names, times):
-    """The times, with the silence before a stop counted to the stop, unless a pause precedes."""
+    """The times of sounds; the silence before a stop belongs to it, except after a pause."""
     moved = list(times)
     for i in range(1, len(names)):
         if names[i] in STOPS and CLASS_OF[names[i - 1]] != "sil":

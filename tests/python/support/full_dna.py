@@ -240,7 +240,7 @@ def _other_arrays(value: np.ndarray) -> Iterator[np.ndarray]:
             if value.dtype.kind != "u":
                 out.flat[at] += change / 4
             elif 0 <= int(out.flat[at]) + change <= np.iinfo(value.dtype).max:
-                out.flat[at] = int(out.flat[at]) + change  # NumPy 2 adds no -1 to what has no sign
+                out.flat[at] = int(out.flat[at]) + change  # NumPy 2 adds no -1 to unsigned numbers
             else:
                 continue
             yield out

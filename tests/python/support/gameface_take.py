@@ -37,7 +37,7 @@ def driven(weights, table):
 
 
 class Posed:
-    """The meshes of a .glb at weights, and the rig's meshes in the same order at raw controls."""
+    """The meshes of a .glb for target weights, and the rig's meshes in the same order."""
 
     def __init__(self, dna, rig, found, lod, *, facing_back=False):
         self.rig, self.found = rig, found
@@ -102,7 +102,7 @@ def _apart(a, b):
 
 
 def _nearest(points, wanted):
-    """int64[n]: the point at each wanted place; points of one place move alike."""
+    """The index of the point nearest to each wanted place, int64[n]."""
     out = np.empty(len(wanted), np.int64)
     for begin in range(0, len(wanted), 256):
         part = wanted[begin : begin + 256]

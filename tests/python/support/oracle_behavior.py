@@ -40,7 +40,7 @@ def unit(q):
 
 
 def from_euler(sequence, signs, angles):
-    """[..., 4] of angles [..., 3] in radians, turned about the first axis of the sequence first."""
+    """Quaternions [..., 4] of angles [..., 3] in radians, in the order of the sequence."""
     angles = np.asarray(angles, float)
     q = np.broadcast_to([0, 0, 0, 1.0], (*angles.shape[:-1], 4))
     for axis in ("xyz".index(a) for a in sequence):
@@ -52,7 +52,7 @@ def from_euler(sequence, signs, angles):
 
 
 def to_euler(dna, q):
-    """Angles in the file's unit from a rotation matrix whose rows are the rotated axes."""
+    """The Euler angles of a quaternion, in the file's unit and rotation sequence."""
     m = oracle.quaternion_to_matrix(q)
     i, j, k = ("xyz".index(a) for a in dna.rotation_sequence)
     parity = 1 if j == (i + 1) % 3 else -1

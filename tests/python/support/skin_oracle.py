@@ -10,7 +10,7 @@ SIDE = 14  # vertices along a side of the face's patch
 
 
 def skinned(dna, pose, mesh=0):
-    """float64[V, 3] in the file's units: a Pose on a mesh whose joints turn x, then y, then z."""
+    """Vertices of a posed mesh in the file's units, float64[V, 3]; rotations in order xyz."""
     geometry = dna.meshes[mesh]
     points = geometry.positions.astype(np.float64)
     for target in geometry.blend_shape_targets:
