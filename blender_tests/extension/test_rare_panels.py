@@ -40,11 +40,11 @@ def test_a_face_has_a_hint_until_it_is_dismissed(rig):
         return "pulls at the skin" in drawn(bpy.types.RISORIUS_PT_character).text()
 
     addons = bpy.context.preferences.addons
-    entry = addons.new()  # tests enable the add-on without one
+    entry = addons.new()  # tests enable the add-on without an entry
     entry.module = scene.MODULE
     assert says()
     scene.set_controls(rig, jawOpen=0.3)
-    assert says()  # a hand on a slider must not find another one under it
+    assert says()  # the hints stay, so that sliders do not move under the mouse
     assert bpy.ops.risorius.hide_hints() == {"FINISHED"}
     assert not says()
     addons[scene.MODULE].preferences.hints = True

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads as other programs save them, by formula: face, eyes, teeth, hair and body as meshes."""
+"""Heads by formula in the forms of other programs: face, eyes, teeth, hair and body as meshes."""
 
 import json
 import struct
@@ -7,7 +7,7 @@ import struct
 import face_shapes
 import numpy as np
 
-# What turns a head that looks along +z, y up, x left: rows are where its x, y and z go.
+# Rotations of a head that looks along +z, with y up and x left; rows are the images of x, y and z.
 STANDS = {
     "+z": np.eye(3),
     "-z": np.array([[-1, 0, 0], [0, 1, 0], [0, 0, -1]]),
@@ -59,7 +59,7 @@ def joined(*pieces):
 
 
 def skull(lopsided=False):
-    """The formula's face with a nose, a back of the head: positions, triangles and shapes."""
+    """The formula's face with a nose and a back of the head: positions, triangles and shapes."""
     points, quads = face_shapes.head()
     moved = face_shapes.expressions(points)
     nose = face_shapes.bump(points, 0, -1, 2.0)[:, None] * [0, 0, 2.5]
@@ -78,7 +78,7 @@ def eyes():
 
 
 def teeth():
-    """Upper and lower ones, within the mouth."""
+    """Upper and lower teeth inside the mouth."""
     return slab([-2, -4.5, 5], [2, -3.2, 7]), slab([-2, -8, 5], [2, -6.8, 7])
 
 
