@@ -77,8 +77,7 @@ class _Completing:
         return self.out
 
     def _eye(self, side: str) -> bool:
-        """Fit an eyeball of the template into the head; False if the head has no open lids for it.
-        """
+        """Fit an eyeball of the template into the head; False if the head has no open lids."""
         ball = self.like.eyes.get(side)
         lids = find_eyelids(self.skin, ball) if ball is not None else None
         if ball is None or lids is None:
