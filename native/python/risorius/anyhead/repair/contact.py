@@ -28,7 +28,7 @@ _AROUND = 15.0  # cm: length of the rays that test visibility
 _WAYS = 3  # of 15 directions from which a visible vertex must be seen
 _SHORT = 0.2  # cm: the visible region does not grow over longer edges
 _RIM = 2  # rings of neighbours that are added to the visible vertices
-_LARGE = 60_000  # vertices: SkinChecker does not repair larger skins, because it is slow
+_LARGE = 60_000  # vertices: larger skins are only pushed along normals, without SkinChecker
 Mask = npt.NDArray[np.bool_]
 
 
