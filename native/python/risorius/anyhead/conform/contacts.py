@@ -31,7 +31,7 @@ _FAR, _NEAR, _APART, _LEAST = 0.1, 0.05, 0.12, 0.004
 _FACING = 0.2  # least cosine between one normal and the opposite of the other normal
 # Shares of the reach: smoothing of the correction around a contact, for joints and for shapes.
 _BY_JOINTS, _BY_SHAPES = 0.25, 0.05
-_SEEN = 0.001  # of the reach: the least delta that is added to a blend shape
+_SEEN = 0.001  # of the reach: smaller deltas are not added to a blend shape
 _MOST, _FEW = 0.8, 8  # largest share of a motion that is added to it; least number of contacts
 _LARGEST, _FADES = 0.15, 0.5  # of the reach: largest delta of one step, and its fall-off
 _OVERLAP = 1.5  # standard deviations of the gaps: overlap of the lids that the joints aim at
@@ -95,7 +95,7 @@ def keep_contacts(
         change: the deformation of the skin.
         eyes: the eyeballs.
         holds: bindings of the meshes that follow the skin, by mesh index.
-        tell: told the share that is done, 0 to 1.
+        tell: receives the finished share of the work, 0 to 1.
     """
     if not eyes or not len(dna.raw_control_names):
         return out
