@@ -106,7 +106,7 @@ def _balls(part: HeadPart, islands: Ints, height: float) -> list[Ball]:
 
 
 def _looks_out(points: Doubles, ball: Ball) -> bool:
-    """Whether a sphere has vertices at its front. Sockets drawn as the white of an eye have none."""
+    """Whether a sphere has vertices at its front. A socket drawn as an eye's white has none."""
     return bool(points[ball.vertices, 2].max() > ball.middle[2] + _FRONT * ball.radius)
 
 
