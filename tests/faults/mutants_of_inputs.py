@@ -376,7 +376,7 @@ def _peak() -> int:
 
 
 def rounds_of(name: str, seed: int, rounds: int, only: int | None = None) -> Row:
-    """Rounds of a command in a process of their own, and another after each that ends it.
+    """Run rounds of a command in a separate process, and in a new one after each crash.
 
     Args:
         name: one of TRIALS.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small valid inputs of every command, made by code: what mutants_of_inputs puts faults into."""
+"""Makes small valid inputs of all commands, into which mutants_of_inputs puts faults."""
 
 from __future__ import annotations
 

@@ -37,16 +37,19 @@ def folders(path: Path) -> list[str]:
 
 
 def files(path: Path) -> list[str]:
-    """The names of the files in a folder, but for its README.md and what marks a package."""
+    """The names of the files in a folder without README.md, __init__.py and CMakeLists.txt."""
     return [p.name for p in path.iterdir() if p.is_file() and p.name not in _UNNAMED]
 
 
 @dataclass(frozen=True)
 class Map:
-    """A table: its page, its head, the names that are there, and the places where they lie.
+    """A table of a page.
 
-    `there` are the names that the table must have; each name that it has must be a path below one
-    of `places`.
+    Attributes:
+        page: path of the page.
+        head: beginning of the first cell of the table's head.
+        there: names that the table must contain.
+        places: folders; each name in the table must be a path below one of them.
     """
 
     page: str
@@ -55,7 +58,7 @@ class Map:
     places: tuple[str, ...]
 
     def wrong(self, text: str) -> list[str]:
-        """A sentence for each name that is missing in the table, or on the disk."""
+        """A sentence for each name that is missing in the table of a page's text or on the disk."""
         named = [name.rstrip("/") for name in first_cells(text, self.head)]
         where = f"{self.page}, table {self.head}"
         lost = [n for n in named if not any((ROOT / place / n).exists() for place in self.places)]
@@ -69,7 +72,7 @@ def _all(*names: Iterable[str]) -> tuple[str, ...]:
 
 
 def maps() -> list[Map]:
-    """The maps of the project, with what lies there now."""
+    """The maps of the project with the existing names."""
     at = ROOT.joinpath
     native = [f"native/{name}" for name in folders(at("native"))]
     others = ["addon/risorius", "tests", "blender_tests", "packaging", "docs"]

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Which small faults does a test see? Draws mutants by a seed, tries each in a copy of the project.
+"""Mutation tests: draws mutants by a seed, and tests each in a copy of the project.
 
     check/mutants.sh native|package|scene [--under PATH...] [--count N] [--seed N] [--list]
                          [--programs] [--survivors]
 
-A mutant is killed by the first test that fails, or that takes far longer than it does without it;
-tests.toml says which tests stand for which file, the quickest first. One that does not build is
-not counted, another is drawn for it. What is found is kept in build/mutants: a run that was ended
-goes on where it was; --survivors tries once more those that lived, with the tests of now.
+A mutant is killed by the first test that fails or takes much longer than without the mutant.
+tests.toml lists the tests of each file, the fastest first. A mutant that does not build is replaced
+by another one. Results are stored in build/mutants, so that an interrupted run continues.
+--survivors tests the surviving mutants again with the present tests.
 """
 
 from __future__ import annotations
@@ -38,16 +38,17 @@ HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parents[1]
 SEED = 15
 COUNTS = {"native": 80, "package": 60, "scene": 60}
-# Headers stay out: each is a build of all that includes it. Bindings are tables of names.
+# Headers are left out, because a change rebuilds all files that include them. Bindings are left
+# out, because they are tables of names.
 SOURCES = {
     "native": (["native/**/*.cpp", "native/simd/*_body.h"], ["native/bindings/*", "native/web/*"]),
     "package": (["native/python/risorius/**/*.py", "native/python/risorius_people/**/*.py"], []),
     "scene": (["addon/risorius/logic/**/*.py", "addon/risorius/scene/**/*.py"], []),
 }
-SLOW = 300  # CPU seconds for a test of which it is not yet known how many it takes
-WAITS = 10  # seconds of the clock for each CPU second: other programs use the machine too
-MEMORY = 6 << 30  # bytes of any program: a count without end is not to fill the machine
-# Each mutant is compiled and linked: neither symbols for a debugger nor the last optimisations.
+SLOW = 300  # limit in CPU seconds for a test whose usual time is unknown
+WAITS = 10  # limit of wall time in seconds per CPU second, because the machine may be busy
+MEMORY = 6 << 30  # memory limit of a program in bytes, because a mutant may allocate endlessly
+# No debug symbols and low optimisation, because each mutant is compiled and linked.
 OPTIONS = [
     "-DCMAKE_CXX_COMPILER_LAUNCHER=ccache", "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION=OFF",
     "-DCMAKE_CXX_FLAGS_RELWITHDEBINFO=-O1 -DNDEBUG", "-DRISORIUS_QUICK_BUILD_TESTS=ON",
@@ -58,15 +59,15 @@ OPTIONS = [
 
 
 def sources(root: Path, part: str, under: Sequence[str] = ()) -> list[str]:
-    """The files of a part that mutants are made of, from the root.
+    """Paths, relative to the root, of the files of a part that get mutants.
 
     Args:
-        root: The project.
+        root: The project's folder.
         part: native, package or scene.
-        under: Folders or files, from the root, of which they are; none: of the whole part.
+        under: Folders or files, relative to the root, to which the files are limited; empty: all.
 
     Raises:
-        SystemExit: The part has no file under one of them.
+        SystemExit: The part has no file in an entry of `under`.
     """
     patterns, left_out = SOURCES[part]
     found = {str(p.relative_to(root)) for pattern in patterns for p in root.glob(pattern)}
@@ -181,7 +182,7 @@ class Copy:
                 os.utime(place)
 
     def _passes(self, test: str, said: str, mutant: Mutant, source: str) -> bool:
-        """Whether the test that failed passes without the mutant; only then does it count."""
+        """Whether the failed test passes without the mutant; only then the failure counts."""
         named = re.search(r"(?:FAILED|ERROR) (\S+::.+?)(?: - |$)|\[ *FAILED *\] (\S+)", said)
         if named and named.group(1):
             test = named.group(1)
