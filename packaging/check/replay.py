@@ -5,8 +5,8 @@ python packaging/check/replay.py docs/authoring.md [FOLDER]
 
 A TOML block that begins with `# NAME.toml` is written to that file. Blocks of commands are run line
 by line with the `risorius` beside this Python. Lines that need the project's tree (python
-tests/...) are printed and skipped. The input files of a page are made first:
-tests/python/support/face_shapes.py makes the head of docs/authoring.md, and
+tests/...) are printed and skipped. The input files of a page are made first: the file
+tests/python/support/face_shapes.py makes the head of docs/authoring.md, the file
 packaging/films/any_heads.py makes the heads of docs/anyhead.md. For docs/anyhead.md, a sheet of
 each face is drawn at the end for visual inspection.
 """

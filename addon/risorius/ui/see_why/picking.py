@@ -28,10 +28,16 @@ class RISORIUS_OT_why_vertex(FaceOperator, Operator):
     bl_options = {"REGISTER"}
 
     mesh: bpy.props.IntProperty(
-        name="Mesh", description="Its number in the file; -1: the active mesh", default=-1, min=-1
+        name="Mesh",
+        description="Number of the mesh in the file; -1: the active mesh",
+        default=-1,
+        min=-1,
     )
     vertex: bpy.props.IntProperty(
-        name="Vertex", description="Number of the vertex; -1: the first selected vertex", default=-1, min=-1
+        name="Vertex",
+        description="Number of the vertex; -1: the first selected vertex",
+        default=-1,
+        min=-1,
     )
 
     def execute(self, context: Context) -> Result:
