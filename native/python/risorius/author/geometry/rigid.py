@@ -49,7 +49,12 @@ def rigid_way(points: Floats, pivot: Floats, rotation: Floats, shift: Floats) ->
 
 
 def part_rotation(rotation: Floats, share: float) -> Floats:
-    """The rotation about the same axis by a fraction of the angle (Rodrigues)."""
+    """The rotation about the same axis by a fraction of the angle (Rodrigues).
+
+    Args:
+        rotation: [3, 3].
+        share: the fraction.
+    """
     angle = np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)) * share
     axis = np.array(
         [
