@@ -19,6 +19,7 @@ PARTS = {
     "ranges": ["clip"],
     "files": ["convert", "edit"],
     "onto": ["author"],
+    "conform": ["author"],
 }
 
 
