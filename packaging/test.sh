@@ -35,7 +35,7 @@ source packaging/check/rows.sh
 # because these detect more. Long computations (long_sums) do not run under the sanitizers, because shorter
 # tests cover the same lines.
 optimised=(simd rig threads compile clip memory solve author)
-long_sums='Correct.TheSkinInItself|Correct.WhatTwoParts|Fit.WhatIsBound|Fit.WeightsGoOn|Fit.AnotherFace|Fit.JointsLeave'
+long_sums='Correct.TheSkinInItself|Correct.WhatTwoParts|Fit.WhatIsBound|Fit.WeightsGoOn|Fit.AnotherFace|Fit.JointsLeave|Register.WhatLooks|Register.DoesNotDepend'
 every_byte='EveryByte|EveryPatched|EveryChangedByte|ChangedBytes|CutAtEvery|DamagedByte|DamageUnder|Changes.*Reads'
 # Python test files that --quick leaves out, because they take longest.
 slow_python=(batch command_bench command_convert command_diff command_plot edit_regroup rig_nan rig_settle
