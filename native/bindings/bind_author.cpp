@@ -20,7 +20,8 @@ using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Indices = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
 
-/// [V, 3], [E, V, 3] and [edges, 2] as Shapes. Raises ValueError where shapes do not agree.
+/// Converts arrays [V, 3], [E, V, 3] and [edges, 2] to Shapes. Raises ValueError if the shapes of
+/// the arrays do not agree.
 author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const Indices& edges,
                       const Doubles& importance) {
   if (neutral.ndim() != 2 || neutral.shape(1) != 3) shape_error("neutral", "(V, 3)", neutral);
@@ -50,7 +51,7 @@ author::Shapes shapes(const Doubles& neutral, const Floats& displacements, const
   return out;
 }
 
-/// Positions [J, 3] and motions [E, J, 3] of joints that are there, as GivenJoint.
+/// Converts positions [J, 3] and motions [E, J, 3] of existing joints to GivenJoint.
 /// A joint that no expression moves has no motions.
 std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Doubles& rotations,
                                              const Doubles& translations, std::size_t expressions) {
@@ -80,12 +81,14 @@ std::vector<author::GivenJoint> given_joints(const Doubles& positions, const Dou
   return out;
 }
 
-/// Joints that are there, with the motions of each.
+/// Existing joints with their motions, which the fit keeps.
 struct GivenJoints {
   std::vector<author::GivenJoint> joints;
 };
 
-/// float64[J, 3] positions, float64[E, J, 3] motions and uint32[J] or no joints of the other side.
+/// In: positions                float64[J, 3]
+///     rotations, translations  float64[E, J, 3]
+///     mirrored                 uint32[J], joints of the other side, or empty
 GivenJoints given(const Doubles& positions, const Doubles& rotations, const Doubles& translations,
                   const Indices& mirrored) {
   if (positions.ndim() != 2 || positions.shape(1) != 3) {
@@ -115,7 +118,8 @@ author::StartWeights start_weights(const Indices& joints, const Floats& weights)
   return out;
 }
 
-/// The options with the given joints, whose motions are of the shapes' expressions.
+/// The options with the given joints added. Raises ValueError if their motions have another number
+/// of expressions than the shapes.
 author::FitOptions with_given(author::FitOptions options, const author::Shapes& shapes,
                               const GivenJoints& given) {
   for (const author::GivenJoint& joint : given.joints) {
@@ -128,7 +132,7 @@ author::FitOptions with_given(author::FitOptions options, const author::Shapes& 
   return options;
 }
 
-/// What `work` returns, without the GIL.
+/// Runs `work` without the GIL and returns its result; raises its error.
 template <class Work>
 Fit fitted(const Work& work) {
   auto result = [&] {
@@ -163,7 +167,7 @@ Fit fit_motions(const author::Shapes& shapes, const GivenJoints& given,
   return fitted([&] { return author::fit_motions(shapes, all, weights, at); });
 }
 
-/// float64[expressions, joints, 3] of one half of the motions.
+/// float64[expressions, joints, 3]: the rotations or the translations (`half`) of the motions.
 Doubles motions(const Fit& fit, author::Vector3 author::JointMotion::* half) {
   const std::size_t joints = fit.joints.size(), count = fit.motions.size() / joints;
   Doubles out({static_cast<py::ssize_t>(count), static_cast<py::ssize_t>(joints), py::ssize_t{3}});
@@ -184,7 +188,7 @@ py::array_t<T> rows(const std::vector<T>& values, std::size_t width) {
   return out;
 }
 
-/// uint32[n, 3] triangles and the error: see risorius.author.simplify.
+/// Returns uint32[n, 3] triangles and the error; see risorius.author.simplify.
 py::tuple simplify(const Floats& positions, const Floats& attributes, const Indices& triangles,
                    std::size_t count) {
   if (positions.ndim() != 2 || positions.shape(1) != 3)
@@ -283,7 +287,7 @@ void bind_fits(py::module_& m) {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// The value of that name. Raises ValueError: none of the names.
+/// The value of a name. Raises ValueError for a name that is not in `known`.
 template <class T, std::size_t kCount>
 T named(const char* what, const std::string& name,
         const std::array<std::pair<const char*, T>, kCount>& known) {
@@ -311,7 +315,7 @@ author::Packing packing(std::size_t count, std::size_t stride, const std::string
   return {count, stride, named("mode", mode, kModes), named("filter", filter, kFilters)};
 }
 
-/// What `work` gives, without the GIL. Raises ValueError with the error's sentence.
+/// Runs `work` without the GIL and returns its bytes; raises its error as ValueError.
 template <class Work>
 py::bytes worked(const Work& work) {
   const core::Result<Bytes> result = [&] {

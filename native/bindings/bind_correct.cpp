@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What goes wrong where expressions meet.
+// Binds the checker that finds faults of the skin in combinations of expressions.
 #include <algorithm>
 #include <utility>
 
@@ -78,7 +78,7 @@ void bind_faults(py::module_& m) {
 
 using CheckerClass = py::class_<SkinChecker>;
 
-// The methods that read a skin and change nothing.
+// Binds the methods that check a skin but do not change it.
 void bind_looks(CheckerClass& c) {
   c.def_property_readonly(
        "shown",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Surfaces laid onto others.
+// Binds the registration of surfaces, closest points and sparse systems.
 #include <exception>
 #include <functional>
 #include <utility>

@@ -25,9 +25,7 @@ _COLORS = {
     PLACED: (0.2, 0.5, 1.0, 1.0),
 }
 _SIZE = 0.012  # size of an empty / largest side of the box around all landmarks
-_STAYED = (
-    1e-4  # of that side: a landmark this close to the place where it was found is not moved
-)
+_STAYED = 1e-4  # of that side: a landmark this close to the place where it was found is not moved
 
 
 class Point(NamedTuple):
