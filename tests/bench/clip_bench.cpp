@@ -64,7 +64,7 @@ void decode(benchmark::State& state, const File& file) {
 
 void one_frame(benchmark::State& state, const File& file) {
   clip::Player player(open(file));
-  // Far from the frame before, so that it lies in another block unless the clip has only one.
+  // Far from the last frame, so that the frame is in another block if the clip has several.
   std::size_t at = 0;
   for (auto _ : state) {
     benchmark::DoNotOptimize(player.frame(at));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Results, budgets and containers of numbers keep the promises that their users rely on.
+// Tests of results, budgets and containers of numbers.
 #include <gtest/gtest.h>
 
 #include <cstdint>
