@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Binds atomic writing: a file appears under its name only when Python has written all of it.
+// Binds atomic writing: a file gets its name only after Python has written its whole content.
 #include "bindings/numpy_arrays.h"
 #include "bytes/file_write.h"
 #include "bytes/path_text.h"

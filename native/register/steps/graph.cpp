@@ -140,7 +140,7 @@ Nodes spread(const Graph& graph, const Points& points, std::size_t count) {
   Nodes nodes;
   nodes.cell.assign(vertices, 0);
   std::vector<double> distance(vertices, kFar);
-  // The farthest vertex is the next node. The heap holds old distances, which only decrease.
+  // The farthest vertex is the next node. Outdated distances in the heap are too large.
   std::priority_queue<Open> farthest;
   for (std::uint32_t v = 0; v < vertices; ++v) farthest.emplace(kFar, v);
   double spacing = 0;
