@@ -120,7 +120,7 @@ TEST(Correct, StretchIsAreaAndAFoldIsACosine) {
   auto positions = scene.skin.neutral;
   for (std::uint32_t v = 0; v < positions.size(); ++v) {
     if (x_of(v) > 10.0) positions[v][0] += 2.0;   // faces at x = 10 become three times as wide
-    if (x_of(v) < -10.0) positions[v][0] += 2.0;  // the faces here lie on their neighbours
+    if (x_of(v) < -10.0) positions[v][0] += 2.0;  // faces at x = -10 fold onto their neighbours
   }
   const auto rest = look(check, scene.pose(scene.skin.neutral));
   const auto found = look(check, scene.pose(positions));

@@ -459,7 +459,7 @@ TEST(Fit, WhatAnotherFaceCannotTakeOverIsSaid) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, core::ErrorCode::kInvalidIndex);
   EXPECT_EQ(refused.error().where, "at[2]");
-  at.pop_back();  // one joint too few
+  at.pop_back();  // `at` has one joint too few
   at[2] = kInTheMiddle;
   refused = fit_motions(shapes, options, weights, at);
   ASSERT_FALSE(refused);
