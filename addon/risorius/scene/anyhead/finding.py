@@ -19,10 +19,10 @@ Doubles = NDArray[np.float64]
 
 
 class Finding(NamedTuple):
-    """Landmarks in the head's own coordinates.
+    """The result of a search: landmarks in the coordinates of the head's object.
 
     Attributes:
-        places: name -> float64[3].
+        places: name -> float64[3], the position.
         missing: names of needed landmarks that were not found.
         notes: sentences about the head.
     """

@@ -52,7 +52,7 @@ class Template(NamedTuple):
     path: str = ""
 
     def load(self) -> native.Dna:
-        """The template face.
+        """Load the template face, unless it is a face of the scene.
 
         Raises:
             DnaError: the file is not a DNA file.

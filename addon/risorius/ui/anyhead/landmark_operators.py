@@ -37,7 +37,7 @@ class OfHead(OperatorBase):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether a head is selected; says why not."""
+        """Whether a head is selected; sets the poll message if not."""
         if not usable(cls):
             return False
         if heads.head_of(context) is None:
@@ -227,7 +227,7 @@ class _OfLandmarks(OfHead):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Whether the head has landmarks; says why not."""
+        """Whether the head has landmarks; sets the poll message if not."""
         if not super().poll(context):
             return False
         if not points.of(head_there(context)):

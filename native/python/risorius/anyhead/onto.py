@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Transfers the expressions of a template to a head: from meshes to a face of blend shapes.
 
-parts -> standing -> laying -> transfer -> fittings, repair -> author's joining -> ShapeSet -> Dna
+The steps: standing, laying, transfer, fittings, repair, author's joining, ShapeSet, Dna.
 """
 
 from __future__ import annotations

@@ -60,7 +60,8 @@ class Registered:
     points: Doubles
     """float64[V, 3]: vertex positions in the unit of the target."""
     triangle: npt.NDArray[np.int32]
-    """int32[V]: the nearest triangle of the target with a similar normal; -1: none."""
+    """int32[V]: the nearest triangle of the target with a similar normal, or the nearest triangle
+    of any direction if it is more than 0.5 mm closer. -1: none."""
     shares: Doubles
     """float64[V, 3], barycentric coordinates in the triangle."""
     distance: Doubles

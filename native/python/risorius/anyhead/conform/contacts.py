@@ -55,7 +55,7 @@ class Touch(NamedTuple):
 
 
 class _Posed:
-    """The skin of a face with one control at 1."""
+    """Vertex positions of the skin of a face, at rest or with one control at 1."""
 
     def __init__(self, dna: Dna, skin: int) -> None:
         self.dna, self.skin = dna, skin

@@ -23,7 +23,7 @@ _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
 _MOUTH = re.compile(r"saliva", re.IGNORECASE)
 _INNER = 0.35  # of the radius: joints closer to the centre of an eye move with the eye
 _RIM, _BAND = 1.1, 0.03  # of the radius: distance of the lid rims from the centre, and its spread
-_STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more than this weight of it
+_STIFF = 0.9  # a vertex moves with the eye if the eye's joints have more of its skin weights
 _PRIOR = 0.01  # weight of the surrounding skin against the distance of the lid rims
 _ROUNDS = 20
 

@@ -22,7 +22,7 @@ _FIVE = 5  # triangles of polygons with more corners are not compared
 
 
 def sculpted(dna: Dna, parts: Sequence[HeadPart]) -> dict[str, Doubles]:
-    """float64[V, 3] by mesh name: vertex positions of the LOD 0 meshes that a head has.
+    """float64[V, 3] by mesh name: vertex positions in the head, for each LOD 0 mesh with a match.
 
     A mesh matches if it has the same polygons, also triangulated. If several meshes match, such as
     both eyes, the most similar name is taken, then the first.

@@ -110,7 +110,7 @@ def _patches(skin: Surface, anchors: Ints, size: int) -> Ints:
 
 
 def _turns(before: Doubles, after: Doubles) -> tuple[Doubles, Doubles]:
-    """float64[n, 3, 3] rotations and float64[n] sizes of patches (Umeyama 1991)."""
+    """float64[n, 3, 3]: rotations, float64[n]: scale factors of patches (Umeyama 1991)."""
     u, s, vt = np.linalg.svd(np.einsum("npi,npj->nij", after, before))
     sign = np.sign(np.linalg.det(u @ vt))
     u[:, :, 2] *= sign[:, None]

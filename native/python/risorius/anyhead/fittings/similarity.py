@@ -12,7 +12,13 @@ from ...author.geometry.skeleton import Doubles
 
 @dataclass(frozen=True)
 class Similarity:
-    """p -> scale * turn @ (p - before) + after."""
+    """The transform p -> scale * turn @ (p - before) + after.
+
+    Attributes:
+        turn: float64[3, 3], the rotation.
+        scale: the scale factor.
+        before, after: float64[3], a point and its image.
+    """
 
     turn: Doubles
     scale: float

@@ -177,7 +177,7 @@ class _Place:
         return self.eye_height - 7.0 * self.unit
 
     def in_mouth(self, points: Doubles) -> bool:
-        """Whether points lie behind the lips."""
+        """Whether points have the size and the place of a mesh behind the lips."""
         low, high = points.min(axis=0), points.max(axis=0)
         middle = (low + high) / 2
         return bool(
@@ -293,7 +293,7 @@ def _divide_mouth(out: Fittings, place: _Place) -> None:
 
 
 def _heights(part: HeadPart) -> tuple[Ints, Doubles]:
-    """The island of each vertex, and the height of the middle of each island."""
+    """int64[V]: the island of each vertex; float64[islands]: the middle height of each island."""
     labels: Ints = islands_of(part.mesh)
     heights, count = part.mesh.positions[:, 1], int(labels.max()) + 1
     low, high = np.full(count, np.inf), np.full(count, -np.inf)

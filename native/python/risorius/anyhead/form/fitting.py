@@ -302,7 +302,7 @@ class _System:
         return np.concatenate(out, axis=2)
 
     def solved(self, pose: Pose) -> Pose:
-        """The pose after the step."""
+        """The pose after a Gauss-Newton step from `pose`."""
         values = np.concatenate([pose.parts[: self.parts], pose.expressions[: self.more]])
         hold = np.full(len(values), float(self.step.prior))
         hold[self.parts :] *= _EXPRESSED

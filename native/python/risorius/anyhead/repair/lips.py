@@ -55,7 +55,7 @@ class Meeting:
 
 
 class Lips:
-    """The lips of a target at rest."""
+    """The lips of a target, found at rest, and their gap in poses."""
 
     def __init__(
         self,
