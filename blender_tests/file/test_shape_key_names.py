@@ -115,7 +115,7 @@ def test_what_is_said_is_undone(head):
 
 
 def test_a_picture_shows_where_a_key_moves_the_head(head):
-    """For every orientation of the head; a picture of the sample man shows the assignment."""
+    """A picture shows the motion for any orientation; the sample man shows the assignment."""
     _SAY(becomes="jawOpen")
     shown = scene.submodule("scene.shape_keys.pictures")
     head.rotation_euler.z = np.pi / 2

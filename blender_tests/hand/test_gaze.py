@@ -327,7 +327,7 @@ def test_the_target_that_is_proposed_is_what_the_hand_chose(rig, monkeypatch):
     assert operators.proposed(bpy.context) == "camera"
     for item in (thing, empty):
         item.select_set(True)
-        assert operators.proposed(bpy.context) == item.name  # beside the face, which is active
+        assert operators.proposed(bpy.context) == item.name  # the face stays active
     empty.select_set(False)
     bpy.context.view_layer.objects.active = empty
     assert operators.proposed(bpy.context) == "empty"

@@ -242,7 +242,7 @@ def turn(rig, name):
 
 @pytest.fixture
 def turning(dna_file):
-    """Keys of the head at 1 and 40, the neck in Euler angles, and a tweak from 10 to 30."""
+    """Head keys at 1 and 40, the neck in Euler angles, and a tweak from 10 to 30."""
     rig = scene.load(dna_file)
     pose_bone(rig, "neck").rotation_mode = "XYZ"
     for frame, angle in ((1, 0.1), (40, 0.3)):
@@ -255,7 +255,7 @@ def turning(dna_file):
 
 @pytest.mark.parametrize("keyed", [True, False])
 def test_bones_of_head_neck_and_eyes_go_into_the_tweak(turning, keyed):
-    """By I and auto-key at the frame, without a key when it changes; the bake has them too."""
+    """Keyed by I or auto-key, or unkeyed when the frame changes; the bake has them too."""
     before, base = below(turning), {f: seen(turning, f) for f in (5, 35)}
     stood = {n: tuple(getattr(pose_bone(turning, n), BONES[n][0])) for n in BONES if n != "head"}
     go(turning, 20)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""No text of a panel or dialog is cut off at Blender's own widths; automatic values are named."""
+"""No text of a panel or dialog is cut off at default widths; special values have names."""
 
 from pathlib import Path
 from types import SimpleNamespace

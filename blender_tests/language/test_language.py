@@ -41,7 +41,7 @@ def test_our_words_have_a_context_of_their_own(german):
 
 
 def test_properties_that_blenders_types_get_have_the_context_too():
-    """Like properties of our classes, so that Blender finds their translations."""
+    """Properties of Blender's own types need the context too, so that texts are found."""
     ours = [
         prop
         for kind in (bpy.types.Object, bpy.types.WindowManager, bpy.types.Scene)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials: nothing is flat, maps reach colour and relief, textures are found, seams close."""
+"""Materials: varied colours, maps for colour and relief, found textures, no seams."""
 
 from types import SimpleNamespace
 
@@ -203,7 +203,7 @@ OFFSETS = ((0.9, 0.5, 0.5), (0.1, 0.5, 0.5))
 
 
 def _write_maps(folder, wrinkle, mask_left):
-    """Base and wrinkle maps by MetaHuman's names, and a packed mask whose red is one half."""
+    """Write base and wrinkle maps with MetaHuman's names, and a mask with half of red set."""
     folder.mkdir()
     looks.write_image(folder / "head_color_map.png", np.full((16, 16, 3), 0.6, np.float32))
     looks.write_image(folder / "head_normal_map.png", looks.halves([0.5, 0.5, 1], [0.5, 0.5, 1]))
@@ -532,7 +532,7 @@ def test_where_no_name_is_known_the_configuration_itself_says_what_numbers_are(d
 
 
 def test_head_and_body_have_the_same_normals_at_the_seam(tmp_path):
-    """A sphere cut in two: without the file's normals each half would shade to its own rim."""
+    """A sphere cut in two; without the file's normals each half is shaded to its own rim."""
     face = small_face()
     center = np.array([0.0, 158.0, 2.0])
     whole = fine_mesh(np.random.default_rng(1), (40, 44), 10.0, center, (1, 2), ())

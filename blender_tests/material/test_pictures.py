@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Textures beside a file: their unpacked size is bounded by their file size and checked before."""
+"""Textures: their unpacked size is limited by their file size and checked before loading."""
 
 import random
 import struct

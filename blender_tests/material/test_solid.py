@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The solid view, in which people animate: gaze and lids are seen, no mask blackens the head."""
+"""The solid view, used for animation: gaze and lids are visible, no mask blackens the head."""
 
 import bpy
 import numpy as np

@@ -27,7 +27,7 @@ def why(name):
 
 
 def raw_with(rig, path, **values):
-    """float32[R] of the sliders with some values replaced, by the ends of their names."""
+    """Raw controls of the sliders, float32[R], with some values replaced by name endings."""
     raw = scene.raw_of(rig, path)
     names = risorius.load(str(path)).raw_control_names
     for end, value in values.items():
@@ -36,7 +36,7 @@ def raw_with(rig, path, **values):
 
 
 def wanted(path, mesh, raw, without_corrective=False):
-    """float64[V, 3] millimetres by the oracle; a corrective is taken out of the pose by hand."""
+    """Vertices by the oracle in mm, float64[V, 3], with or without the corrective."""
     dna = risorius.load(str(path))
     pose = risorius.Rig(dna).evaluate(np.asarray(raw, np.float32))
     if without_corrective:
