@@ -23,7 +23,8 @@ class RunsBeside(_Base):
     """
 
     def wait_beside(self) -> None:
-        """Let `begin` run the task in the background; `execute` alone waits for its result."""
+        """Let the next `begin` run its task in the background. `invoke` calls this; an `execute`
+        without `invoke`, as in a script, waits for the result."""
         self._beside = not bpy.app.background
 
     def begin(self, context: Context, task: Task) -> Result:

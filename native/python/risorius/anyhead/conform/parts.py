@@ -169,7 +169,7 @@ def stiff_share(mesh: Mesh, joints: frozenset[int]) -> npt.NDArray[np.bool_]:
 
 
 def _holding(mesh: Mesh, vertices: Ints, joints: int) -> frozenset[int]:
-    """Joints with more than half of the skin weights of the vertices."""
+    """The joint with more than half of the sum of the vertices' skin weights; empty if none has."""
     vertex, joint, weight = sk.skin_entries(mesh)
     own = np.isin(vertex, vertices)
     held = np.bincount(joint[own], weights=weight[own], minlength=joints)
