@@ -87,7 +87,7 @@ std::vector<Influence> candidates_of(const Problem& problem, const State& state,
     }
     score[j] += add;
   };
-  // One resting joint is enough: there may be more of them than candidates.
+  // A joint without motion is a candidate once: several such joints would fill all candidate slots.
   for (std::uint32_t j = 0; j < state.joints.size(); ++j) {
     if (!state.joints[j].rests) continue;
     note(j, 100.0);

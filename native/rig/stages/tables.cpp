@@ -39,8 +39,8 @@ void maps(const Rig& rig, std::uint32_t lod, const PoseView& pose) noexcept {
   clamp(out, rig.animated_map_count);
 }
 
-// Compares counted bytes: every channel reads its control, or each active control names its
-// channels.
+// Whether it is cheaper, in bytes read, to list the channels of each active control than to look at
+// the control of every channel.
 bool lists_channels(const Rig& rig, std::uint32_t run, std::uint32_t shapes,
                     std::size_t active) noexcept {
   constexpr std::size_t kLooked = 2 * sizeof(std::uint16_t) + 2 * sizeof(float),
