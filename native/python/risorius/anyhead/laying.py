@@ -9,6 +9,7 @@ import numpy as np
 
 from ..author.geometry.skeleton import Doubles
 from .errors import Stopped
+from .form.teeth import JawChange, jaw_change
 from .landmarks.find import Found, Hints, find_form
 from .landmarks.start import pairs_of, start_of
 from .registration import Registered, RegisterOptions, StoppedError, register
@@ -24,11 +25,13 @@ class Laid:
         points: float64[V, 3], the template's vertices.
         trust: float64[V], 0 to 1: how sure the place of each is.
         registered: None: the head has the template's own triangles.
+        jaw: how the lower teeth differ; None: not known.
     """
 
     points: Doubles
     trust: Doubles
     registered: Registered | None = None
+    jaw: JawChange | None = None
 
 
 def lay(
@@ -79,7 +82,8 @@ def lay_surface(
         Stopped: progress said False.
     """
     if np.array_equal(template.triangles, target.triangles):
-        return Laid(target.points, np.ones(len(target.points)))
+        jaw = jaw_change(template, target.points, target, found.pose)
+        return Laid(target.points, np.ones(len(target.points)), None, jaw)
     own = find_form(template, Hints(name, up=np.eye(3)[1], front=np.eye(3)[2]))
     start = start_of(template, target, own, found)
     pairs = [(v, goal.tolist()) for v, goal in pairs_of(template, own, found)]
@@ -88,4 +92,5 @@ def lay_surface(
         laid = register(template, target, pairs, options, start, progress)
     except StoppedError:
         raise Stopped from None
-    return Laid(laid.points, laid.trusted.astype(np.float64), laid)
+    jaw = jaw_change(template, laid.points, template, own.pose)
+    return Laid(laid.points, laid.trusted.astype(np.float64), laid, jaw)

@@ -123,7 +123,7 @@ def onto(
     laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
     tell(f"carrying {counted(len(source.ways), 'expression')} over")
     wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
-    carried = transfer(source, target, laid.points, laid.trust, wanted, rest)
+    carried = transfer(source, target, laid.points, laid.trust, wanted, rest, laid.jaw)
     fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
     mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
     every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})

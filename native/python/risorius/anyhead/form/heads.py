@@ -16,6 +16,27 @@ FILE_NAME = "heads.npz"  # made by packaging/ship/make_head_form.py
 
 
 @dataclass(frozen=True)
+class TeethForm:
+    """What the skin tells of the lower teeth: a linear regression over the drawn heads.
+
+    It tells the middle of the teeth, three numbers, and then row by row the matrix [3, 3] that
+    makes the mean head's teeth those of this head.
+
+    Attributes:
+        vertices: int64[n] of the skin, those that tell them.
+        ways: float64[12, n, 3]: what a shift of each vertex by 1 cm from the mean adds.
+        usual: float64[12], of the mean skin.
+        mean, spread: float64[12], of all heads.
+    """
+
+    vertices: Ints
+    ways: Doubles
+    usual: Doubles
+    mean: Doubles
+    spread: Doubles
+
+
+@dataclass(frozen=True)
 class HeadForm:
     """Heads as a mean plus weighted parts, in cm, 0 between the eyes, standing.
 
@@ -30,6 +51,7 @@ class HeadForm:
         triangles: int64[T, 3].
         weights: float64[V], how much each vertex says of where a face is, 0 to 1.
         places: vertex of each landmark by name.
+        teeth: what the skin tells of the lower teeth.
     """
 
     mean: Doubles
@@ -39,6 +61,7 @@ class HeadForm:
     triangles: Ints
     weights: Doubles
     places: dict[str, int]
+    teeth: TeethForm
 
     @property
     def skin(self) -> int:
@@ -64,7 +87,14 @@ def head_form() -> HeadForm:
         form = packed["form"] * packed["form_scale"][:, None, None]
         parts = packed["parts"] * packed["part_scale"][:, None, None]
         places = zip(packed["names"].tolist(), packed["places"].tolist(), strict=True)
+        vertices = packed["teeth_vertices"].astype(np.int64)
+        ways = packed["teeth_ways"] * packed["teeth_scale"][:, None]
+        teeth = TeethForm(
+            vertices, ways.reshape(-1, len(vertices), 3), packed["teeth_usual"],
+            packed["teeth_mean"], packed["teeth_spread"],
+        )  # fmt: skip
         return HeadForm(
             form[0], parts, form[1:], tuple(packed["expressions"].tolist()),
             packed["triangles"].astype(np.int64), packed["weights"] / 255.0, dict(places),
+            teeth,
         )  # fmt: skip

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...author.geometry.skeleton import Doubles
 from ..errors import AnyHeadError, Stopped
+from ..form.teeth import JawChange
 from ..surface import Surface
 from .carrying import Carrying
 from .spreading import Spreading
@@ -53,6 +54,7 @@ def transfer(
     trusted: Doubles,
     options: TransferOptions | None = None,
     progress: Progress | None = None,
+    teeth: JawChange | None = None,
 ) -> Transferred:
     """Carries all poses of a template to a head that it lies on.
 
@@ -63,6 +65,7 @@ def transfer(
         trusted: bool or float[T], 0 to 1: how sure the place of each is.
         options: how strong expressions are.
         progress: told the share that is done, 0 to 1; False stops.
+        teeth: how the lower teeth differ; None: the form of the skin tells it.
 
     Raises:
         AnyHeadError: no vertex of the head lies near the template, or a strength out of range.
@@ -72,7 +75,7 @@ def transfer(
     if not STRENGTHS[0] <= o.strength <= STRENGTHS[1]:
         raise AnyHeadError(f"strength: a number from 0 to 1.5 was expected, found {o.strength:g}")
     trust = np.asarray(trusted, np.float64)
-    ways = Carrying(face, points, trust).ways(o.strength)
+    ways = Carrying(face, points, trust, teeth).ways(o.strength)
     _tell(progress, 0.1)
     lying = Surface(points, face.surface.triangles)
     spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)
