@@ -19,7 +19,8 @@ from ...base.errors import ArgumentError
 from ..errors import Stopped
 from .change import Change, Hold, similar, surface_of
 from .contacts import keep_contacts
-from .joints import Places, place_joints, shifts_carried
+from .jaw import jaw_between, mouth_of
+from .joints import Places, jaw_of, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
 
 Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
@@ -73,7 +74,10 @@ def conform(
     change = Change(dna.meshes[skin], before, given[dna.mesh_names[skin]])
     tell(0.2)
     world = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
-    stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth_way(dna, change))
+    joint = jaw_of(dna, [m for m in finest(dna) if kind(dna.mesh_names[m]) == "mouth"])
+    jaw = jaw_between(dna, skin, joint, change, given)
+    mouth = mouth_way(dna, change) if jaw is None else mouth_of(jaw, change.turn)
+    stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth, joint, jaw)
     meshes: dict[int, Moved] = {}
     for m in range(min(len(dna.meshes), len(dna.mesh_names))):
         if len(dna.meshes[m].positions):
@@ -86,7 +90,7 @@ def conform(
     ]
     tell(0.5)
     place_joints(out, places, change.turn)
-    out.joint_groups = shifts_carried(dna, places, change.turn)
+    out.joint_groups = shifts_carried(dna, places, change.turn, stiff)
     tell(0.6)
     rest = telling(progress, 0.6, 1.0)
     holds = {m: own.hold for m, own in meshes.items() if own.hold is not None}

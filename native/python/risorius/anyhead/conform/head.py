@@ -21,19 +21,11 @@ from ..landmarks.marks import Landmarks
 from ..laying import lay_surface
 from ..standing import Standing, stand
 from ..surface import Surface
-from .change import surface_of
+from .axes import mm_of, standing_axes, standing_skin
 from .face import Progress, conform, telling
 from .parts import Ball, finest, skin_of
 from .same import has_polygons_of, into_own_space, sculpted, turn_back
 
-_DIRECTIONS = {
-    "right": (1, 0, 0),
-    "left": (-1, 0, 0),
-    "up": (0, 1, 0),
-    "down": (0, -1, 0),
-    "front": (0, 0, 1),
-    "back": (0, 0, -1),
-}
 _STOOD, _LAID = 0.15, 0.75  # shares of the work at whose ends the steps are
 
 
@@ -137,7 +129,7 @@ def _laid(
     the unit and the position of the face."""
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     before = np.asarray(dna.meshes[skin].positions, np.float64)
-    template = _outward(surface_of(dna.meshes[skin], size * before @ axes))
+    template = standing_skin(dna, skin)
     parts = sort_parts(standing.parts)
     face = parts.face.mesh
     target = Surface.of_polygons(face.positions, face.faces)
@@ -161,15 +153,6 @@ def _laid(
     return there(laid.points), balls
 
 
-def _outward(surface: Surface) -> Surface:
-    """The surface with triangles that face outward. Left-handed files have them inverted."""
-    middle = surface.points.mean(axis=0)
-    corners = surface.points[surface.triangles[:, 0]] - middle
-    if float((corners * surface.face_normals()).sum()) >= 0:
-        return surface
-    return Surface(surface.points, surface.triangles[:, ::-1])
-
-
 def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:
     """Whether a mesh has the vertex count and the polygons of a face's skin.
 
@@ -179,23 +162,3 @@ def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:
     """
     skin = skin_of(dna)
     return skin >= 0 and has_polygons_of(dna.meshes[skin], mesh)
-
-
-def standing_axes(dna: Dna) -> Doubles:
-    """float64[3, 3]: the axes of a file in the standing space (x left, y up, z front), as rows.
-
-    Standing positions are `points @ standing_axes(dna)`.
-
-    Args:
-        dna: the face.
-    """
-    return np.array([_DIRECTIONS[name] for name in dna.coordinate_system], np.float64)
-
-
-def mm_of(dna: Dna) -> float:
-    """Millimetres per unit of a file.
-
-    Args:
-        dna: the file.
-    """
-    return UNITS.get(dna.translation_unit, UNITS["cm"])
