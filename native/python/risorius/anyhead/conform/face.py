@@ -46,6 +46,7 @@ def conform(
     moved: Mapping[str, Doubles],
     progress: Progress | None = None,
     balls: Sequence[Ball] = (),
+    teeth: Doubles | None = None,
 ) -> Dna:
     """Conform a face to the vertex positions of another head.
 
@@ -61,6 +62,7 @@ def conform(
             file; the skin of LOD 0 is required.
         progress: told the share that is done, 0 to 1; False stops.
         balls: eyeballs of the target head; each eye of the face moves to the one near it.
+        teeth: float64[n, 3], the lower teeth of the target head, of any topology.
 
     Raises:
         ArgumentError: the face has no skin mesh, or `moved` lacks the skin, names an unknown mesh,
@@ -75,7 +77,7 @@ def conform(
     tell(0.2)
     world = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
     joint = jaw_of(dna, [m for m in finest(dna) if kind(dna.mesh_names[m]) == "mouth"])
-    jaw = jaw_between(dna, skin, joint, change, given)
+    jaw = jaw_between(dna, skin, joint, change, given, teeth)
     mouth = mouth_way(dna, change) if jaw is None else mouth_of(jaw, change.turn)
     stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth, joint, jaw)
     meshes: dict[int, Moved] = {}

@@ -16,6 +16,7 @@ from ...author.heads.sizes import UNITS
 from ...author.input.obj import ObjMesh
 from ...base.words import joined
 from ..errors import AnyHeadError
+from ..fittings.lower_teeth import lower_teeth
 from ..fittings.sorting import sort_parts
 from ..landmarks.marks import Landmarks
 from ..laying import lay_surface
@@ -100,8 +101,8 @@ def conform_face(
         return Conformed(made, there[name], list(there), [n for n in notes if n])
     standing = stand(where, parts, unit, wishes, marks)
     telling(progress, 0.0, _STOOD)(1.0)
-    points, balls = _laid(dna, skin, standing, threads, progress)
-    made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls)
+    points, balls, teeth = _laid(dna, skin, standing, threads, progress)
+    made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls, teeth)
     return Conformed(made, points, [], standing.notes)
 
 
@@ -124,9 +125,9 @@ def parts_of(dna: Dna) -> list[HeadPart]:
 
 def _laid(
     dna: Dna, skin: int, standing: Standing, threads: int, progress: Progress | None
-) -> tuple[Doubles, list[Ball]]:
-    """The vertex positions of the face's skin on a head, and the eyeballs of the head, in the axes,
-    the unit and the position of the face."""
+) -> tuple[Doubles, list[Ball], Doubles | None]:
+    """The vertex positions of the face's skin on a head, and the eyeballs and the lower teeth of
+    the head, in the axes, the unit and the position of the face."""
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     before = np.asarray(dna.meshes[skin].positions, np.float64)
     template = standing_skin(dna, skin)
@@ -150,7 +151,8 @@ def _laid(
         return np.asarray((places @ back.T + shift) @ axes.T / size)
 
     balls = [Ball(there(eye.middle[None])[0], eye.radius / size) for eye in parts.eyes.values()]
-    return there(laid.points), balls
+    lower = lower_teeth(parts)
+    return there(laid.points), balls, None if lower is None else there(lower)
 
 
 def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:

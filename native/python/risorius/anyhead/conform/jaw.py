@@ -12,22 +12,26 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import Doubles, Ints
 from ...author.heads.sizes import UNITS
 from ...web.kinds import kind_of
-from ..form.teeth import JawChange, jaw_change, standing_pose
+from ..form.teeth import JawChange, jaw_change, shown_by, standing_pose
 from .axes import mm_of, standing_axes, standing_skin
 from .change import Change, Similar
+from .parts import finest
 
 _HELD = 0.9  # a vertex hangs on the jaw if the jaw's joints have more than this weight of it
-_FEW = 8  # vertices: fewer teeth do not show the form of a jaw
-_STEADY = 1e-6
 
 
 def jaw_between(
-    dna: Dna, skin: int, jaw: int, change: Change, given: Mapping[str, Doubles]
+    dna: Dna,
+    skin: int,
+    jaw: int,
+    change: Change,
+    given: Mapping[str, Doubles],
+    teeth: Doubles | None = None,
 ) -> JawChange | None:
     """The change of the lower jaw, in the axes and the unit of the file.
 
-    Lower teeth whose new vertex positions are given show it. Otherwise the model of form tells it
-    by the skin. None if the face has no jaw, or if the model finds no face in the skin.
+    The model of form tells it by the skin, and the lower teeth of the head show it where it has
+    some. None if the face has no jaw, or if the model finds no face in the skin.
 
     Args:
         dna: the source face.
@@ -35,39 +39,40 @@ def jaw_between(
         jaw: the index of its jaw joint, -1: none.
         change: the deformation of the skin.
         given: float64[V, 3] by mesh name, the new vertex positions.
+        teeth: float64[n, 3], the lower teeth of the target head, of any topology.
     """
     if jaw < 0:
         return None
-    teeth = _by_teeth(dna, jaw, given)
-    if teeth is not None:
-        return teeth
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     surface = standing_skin(dna, skin)
     pose = standing_pose(surface)
     if pose is None:
         return None
-    found = jaw_change(surface, size * change.after.points @ axes, surface, pose)
-    if found is None:
+    told = jaw_change(surface, size * change.after.points @ axes, surface, pose)
+    if told is None:
         return None
-    before, after = (p @ axes.T / size for p in (found.before, found.after))
-    return JawChange(before, after, axes @ found.linear @ axes.T)
+    before, after = _lower_teeth(dna, jaw, given)
+    if teeth is not None and not len(after):
+        after = teeth
+    if len(before) and len(after):
+        told = shown_by(told, size * before @ axes, size * after @ axes)
+    one, other = (p @ axes.T / size for p in (told.before, told.after))
+    return JawChange(one, other, axes @ told.linear @ axes.T)
 
 
-def _by_teeth(dna: Dna, jaw: int, given: Mapping[str, Doubles]) -> JawChange | None:
-    before: list[Doubles] = []
-    after: list[Doubles] = []
-    for m, name in enumerate(dna.mesh_names):
-        if name in given and kind_of(name) == "teeth":
-            own = _carried_by(dna, m, jaw)
-            before.append(np.asarray(dna.meshes[m].positions, np.float64)[own])
-            after.append(given[name][own])
-    if sum(map(len, before)) < _FEW:
-        return None
-    one, other = np.concatenate(before), np.concatenate(after)
-    a, b = one - one.mean(axis=0), other - other.mean(axis=0)
-    steady = _STEADY * float((a**2).sum()) * np.eye(3)
-    linear = np.linalg.solve(a.T @ a + steady, a.T @ b + steady).T
-    return JawChange(one.mean(axis=0), other.mean(axis=0), linear)
+def _lower_teeth(dna: Dna, jaw: int, given: Mapping[str, Doubles]) -> tuple[Doubles, Doubles]:
+    """float64[n, 3]: the lower teeth of LOD 0 on the source head, and on the target head where
+    their positions are given."""
+    before, after = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    own = {
+        m: _carried_by(dna, m, jaw) for m in finest(dna) if kind_of(dna.mesh_names[m]) == "teeth"
+    }
+    known = all(dna.mesh_names[m] in given for m in own)
+    for m, vertices in own.items():
+        before.append(np.asarray(dna.meshes[m].positions, np.float64)[vertices])
+        if known:
+            after.append(given[dna.mesh_names[m]][vertices])
+    return np.concatenate(before), np.concatenate(after)
 
 
 def _carried_by(dna: Dna, m: int, jaw: int) -> Ints:

@@ -20,6 +20,8 @@ from .standing import SURE, find_standing
 _NEAR = 1.0  # cm of the form: a vertex of the model farther from a face is not on it
 _LEAST = 0.9  # of the vertices that tell the teeth: so many must lie on the face
 _BEYOND = 3.0  # standard deviations that a quantity of the teeth may have
+_OTHER_SIZE = 0.1  # teeth that differ from the expected size by a larger share are other models
+_OTHER_PLACE = 0.4  # cm: teeth farther from their expected place are other models
 _UP, _FRONT = np.eye(3)[1], np.eye(3)[2]
 
 
@@ -106,3 +108,27 @@ def _teeth(used: Ints, points: Doubles) -> tuple[Doubles, Doubles]:
         (values[:3] - goal) @ turn.T / scale + middle,
         turn @ values[3:].reshape(3, 3) / scale,
     )
+
+
+def shown_by(told: JawChange, before: Doubles, after: Doubles) -> JawChange:
+    """The change of the jaw as the lower teeth of both heads and the skin show it together.
+
+    Boxes around the teeth give the place, and half of the size by width and depth: how high teeth
+    are says nothing of a jaw. Teeth that differ more from the expected ones are other models, and
+    what the skin tells stays.
+
+    Args:
+        told: what the skin tells.
+        before, after: float64[n, 3], the lower teeth of the one head and of the other; they may
+            have other vertices.
+    """
+    sizes = [np.ptp(points, axis=0) for points in (before, after)]
+    if min(size.min() for size in sizes) <= 0:
+        return told
+    middle, there = ((p.min(axis=0) + p.max(axis=0)) / 2 for p in (before, after))
+    scale = float(np.cbrt(max(np.linalg.det(told.linear), 1e-9)))
+    goal = told.after + told.linear @ (middle - told.before)
+    wide = np.log((sizes[1] / sizes[0])[[0, 2]] / scale)
+    if np.abs(there - goal).max() > _OTHER_PLACE * scale or np.abs(wide).max() > _OTHER_SIZE:
+        return told
+    return JawChange(middle, there, float(np.exp(wide.mean() / 2)) * told.linear)
