@@ -112,7 +112,7 @@ def onto(
     notes = _own_shapes(parts)
     tell("looking for the face")
     _at(progress, 0.0)
-    head = stand(where, parts, unit, o.wishes, o.marks)
+    head = stand(where, parts, unit, o.wishes, o.marks, _part(progress, 0.0, _FACE))
     found = sort_parts(head.parts)
     face = found.face
     target = Surface.of_polygons(face.mesh.positions, face.mesh.faces)

@@ -7,7 +7,7 @@ Names, counts and layers stay, so that a program that reads the old file also re
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,14 +16,12 @@ from ... import BlendShapeTarget, Dna, Mesh
 from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
-from ..errors import Stopped
+from ..telling import Progress, telling
 from .change import Change, Hold, similar, surface_of
 from .contacts import keep_contacts
 from .jaw import jaw_between, mouth_of
 from .joints import Places, jaw_of, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
-
-Progress = Callable[[float], object]  # told the share that is done, 0 to 1; False stops
 
 
 class Moved(NamedTuple):
@@ -99,24 +97,6 @@ def conform(
     out = keep_contacts(dna, out, skin, change, stiff.eyes, holds, rest)
     tell(1.0)
     return out
-
-
-def telling(progress: Progress | None, begin: float, end: float) -> Callable[[float], bool]:
-    """A function that reports the progress of a part of the work.
-
-    It raises Stopped if `progress` returns False.
-
-    Args:
-        progress: told the share of the whole work.
-        begin, end: shares of the whole work at which the part begins and ends.
-    """
-
-    def tell(share: float) -> bool:
-        if progress is not None and progress(begin + (end - begin) * share) is False:
-            raise Stopped
-        return True
-
-    return tell
 
 
 def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Doubles]:

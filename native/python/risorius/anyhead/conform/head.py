@@ -22,8 +22,9 @@ from ..landmarks.marks import Landmarks
 from ..laying import lay_surface
 from ..standing import Standing, stand
 from ..surface import Surface
+from ..telling import Progress, telling
 from .axes import mm_of, standing_axes, standing_skin
-from .face import Progress, conform, telling
+from .face import conform
 from .parts import Ball, finest, skin_of
 from .same import has_polygons_of, into_own_space, sculpted, turn_back
 
@@ -99,8 +100,7 @@ def conform_face(
         notes = [f"{joined(list(there))}: the head has the topology of the face", note]
         made = conform(dna, there, telling(progress, 0.0, 1.0))
         return Conformed(made, there[name], list(there), [n for n in notes if n])
-    standing = stand(where, parts, unit, wishes, marks)
-    telling(progress, 0.0, _STOOD)(1.0)
+    standing = stand(where, parts, unit, wishes, marks, telling(progress, 0.0, _STOOD))
     points, balls, teeth = _laid(dna, skin, standing, threads, progress)
     made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls, teeth)
     return Conformed(made, points, [], standing.notes)
