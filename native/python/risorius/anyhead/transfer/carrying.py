@@ -13,6 +13,7 @@ import numpy as np
 from ...author.geometry.rigid import rigid_way
 from ...author.geometry.skeleton import Doubles
 from ..form.teeth import JawChange
+from .closing import BLINKS, closing_shares
 from .form import changes_of_form
 from .template import Pose, TemplateFace, left_over
 
@@ -42,6 +43,12 @@ class Carrying:
         self._face, self._points = face, points
         self._form = changes_of_form(face.surface, points, trust)
         self._jaw = self._jaw_by_form(trust) if teeth is None else teeth
+        self._closing: dict[str, Doubles] = {}
+        for control in BLINKS:
+            if (control,) in face.ways:
+                shares = closing_shares(face, points, control, self.carried((control,)))
+                if shares is not None:
+                    self._closing[control] = shares
 
     def _jaw_by_form(self, trust: Doubles) -> JawChange | None:
         """The change of the jaw from the form of the skin that it moves."""
@@ -85,6 +92,12 @@ class Carrying:
         Args:
             pose: one of the template.
         """
+        way = self._by_form(pose)
+        for control in pose:
+            way = way * self._closing.get(control, 1.0)
+        return way
+
+    def _by_form(self, pose: Pose) -> Doubles:
         way = self._face.ways[pose].astype(np.float64)
         jaw, change = self._face.jaw, self._jaw
         if jaw is None or change is None or pose not in jaw.turns:
