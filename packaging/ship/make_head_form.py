@@ -22,6 +22,7 @@ from risorius.base import toml
 from risorius.files import fileio
 from risorius_people.body import group_indices
 from risorius_people.people import ORIGINS, Person
+from risorius_people.proportions import affine_form
 from risorius_people.source import FACE_UNITS, TARGETS, BaseMesh, Source, fetch
 
 Doubles = NDArray[np.float64]
@@ -39,6 +40,7 @@ ENDS = (
     ("decr", "incr"), ("down", "up"), ("in", "out"), ("backward", "forward"),
     ("concave", "convex"), ("compress", "uncompress"),
 )  # fmt: skip
+TEETH = "helper-lower-teeth"
 EXPRESSIONS = {
     "jaw_open": ("jawOpen",),
     "blink": ("eyeBlinkLeft", "eyeBlinkRight"),
@@ -46,6 +48,8 @@ EXPRESSIONS = {
     "pucker": ("mouthPucker",),
     "wide": ("eyeWideLeft", "eyeWideRight"),
 }
+TEETH_SEEN, TEETH_STEP = 0.5, 3  # least weight of the vertices of the regression; every third one
+TEETH_NOISE = 1.0  # cm^2, sum over all heads of the squared error of registration at a vertex
 DIRECTIONS = 40  # number of directions from which visible triangles are found
 PIXELS = 220  # pixels per decimetre of the pictures that find visible triangles
 PACKAGE = Path(__file__).parents[2] / "native" / "python" / "risorius" / "anyhead"
@@ -257,7 +261,8 @@ def main() -> None:
     balls = np.concatenate([heads.groups[g] for g in eyeballs])
     shown = shown[~np.isin(shown, balls).any(axis=1)]
     own = np.unique(shown)
-    heads.kept = np.concatenate([own, balls])
+    teeth = heads.groups[TEETH]
+    heads.kept = np.concatenate([own, balls, teeth])
     heads._read.clear()
     triangles = np.searchsorted(own, shown)
     half = len(balls) // 2
@@ -295,7 +300,49 @@ def main() -> None:
     moved = np.stack(
         [expression(heads, units, eyes, root, mean, full, rows) for units in EXPRESSIONS.values()]
     )
-    write(mean, parts, moved, triangles, full, mirror_of(base[own]), own)
+    rows = [[c[0] for c in face] for face in heads.base.faces[TEETH]]
+    strip = [np.searchsorted(teeth, face).tolist() for face in rows]
+    lower = [(d - root)[-len(teeth) :] * 10.0 for d in drawn]
+    told = teeth_told(mean[:-4], weights, [s[:-4] for s in samples], lower, strip)
+    write(mean, parts, moved, triangles, full, mirror_of(base[own]), own, told)
+
+
+def teeth_told(
+    mean: Doubles, weights: Doubles, skins: list[Doubles], teeth: list[Doubles],
+    strip: list[list[int]],
+) -> dict[str, NDArray[np.generic]]:  # fmt: skip
+    """The arrays that tell the lower teeth by the skin: a linear regression (ridge).
+
+    Args:
+        mean: float64[V, 3], the mean skin.
+        weights: float64[V], how much a vertex says of where a face is.
+        skins: float64[V, 3] of each head.
+        teeth: float64[n, 3] of each head, vertices of the strip of its lower teeth.
+        strip: polygons of that strip.
+    """
+    chosen = np.flatnonzero(weights >= TEETH_SEEN)[::TEETH_STEP]
+    placed, lower = [], []
+    for skin, own in zip(skins, teeth, strict=True):
+        both = np.concatenate([skin[chosen], own])
+        weight = np.repeat([1.0, 0.0], [len(chosen), len(own)])
+        goal = np.concatenate([mean[chosen], np.zeros_like(own)])
+        there = aligned(both, goal, weight)[0]
+        placed.append((there[: len(chosen)] - mean[chosen]).ravel())
+        lower.append(there[len(chosen) :])
+    middle = np.mean(lower, axis=0)
+    out = np.array([[*t.mean(axis=0), *affine_form(strip, middle, t).ravel()] for t in lower])
+    given = np.array(placed)
+    usual, rest = out.mean(axis=0), given.mean(axis=0)
+    given -= rest
+    held = given @ given.T + TEETH_NOISE * np.eye(len(given))
+    ways = np.linalg.solve(held, out - usual).T @ given
+    small, scale = packed(ways, np.int16)
+    print("rest of the teeth:", (out - usual - given @ ways.T).std(axis=0).round(4))
+    return {
+        "teeth_vertices": chosen.astype(np.uint16), "teeth_ways": small, "teeth_scale": scale,
+        "teeth_usual": (usual - ways @ rest), "teeth_mean": usual,
+        "teeth_spread": out.std(axis=0),
+    }  # fmt: skip
 
 
 def weights_face(weights: Doubles) -> NDArray[np.bool_]:
@@ -365,7 +412,7 @@ def rows_of(rows: Ints, count: int) -> Ints:
 
 def write(
     mean: Doubles, parts: Doubles, moved: Doubles, triangles: Ints, weights: Doubles,
-    mirror: Ints, own: Ints,
+    mirror: Ints, own: Ints, teeth: dict[str, NDArray[np.generic]],
 ) -> None:  # fmt: skip
     names = toml.read(PACKAGE / "landmarks" / "names.toml")
     places, labels = [], []
@@ -386,7 +433,7 @@ def write(
         out, form=form, form_scale=scale, parts=small, part_scale=part_scale,
         triangles=triangles.astype(np.uint16), weights=np.round(weights * 255).astype(np.uint8),
         mirror=mirror.astype(np.uint16), names=np.array(labels), places=np.array(places, np.uint16),
-        expressions=np.array(list(EXPRESSIONS)),
+        expressions=np.array(list(EXPRESSIONS)), **teeth,
     )  # fmt: skip
     path = PACKAGE / "form" / "heads.npz"
     fileio.write_bytes(path, out.getvalue())

@@ -27,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "python"))
 
 import any_heads
 from risorius._native import ClosestPoints
+from risorius.anyhead.form.teeth import jaw_change, standing_pose
 from risorius.anyhead.landmarks.find import Hints, find_form
 from risorius.anyhead.laying import Laid, lay
 from risorius.anyhead.onto import whole_ways
@@ -106,6 +107,7 @@ def main() -> None:
     args = parser.parse_args()
     source = any_heads.generator()
     face = skin_of(MAN, source)
+    stands = standing_pose(face.surface)
     upright = Hints(up=np.eye(3)[1], front=np.eye(3)[2])
     print(f"{len(face.ways)} poses of {len(face.surface.points):,} vertices; mm")
     print(f"{'head':34} {'mean':>6} {'worst':>6} {'95 %':>6} beyond {MEAN} and {MOST}")
@@ -116,12 +118,15 @@ def main() -> None:
         target = any_heads.remeshed(true_face.surface, SHARES[number % len(SHARES)], seed)
         begin = time.perf_counter()
         if args.known:
-            laid = Laid(true_face.surface.points, np.ones(len(face.surface.points)))
+            true = true_face.surface.points
+            jaw = jaw_change(face.surface, true, face.surface, stands)
+            laid = Laid(true, np.ones(len(true)), None, jaw)
         else:
             laid = lay(face, target, find_form(target, upright), args.threads)
         middle = time.perf_counter()
+        options = TransferOptions(1.0, args.threads)
         got = whole_ways(
-            transfer(face, target, laid.points, laid.trust, TransferOptions(1.0, args.threads)).ways
+            transfer(face, target, laid.points, laid.trust, options, None, laid.jaw).ways
         )
         end = time.perf_counter()
         on, true = truth_on(true_face, target)

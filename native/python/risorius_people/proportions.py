@@ -40,7 +40,8 @@ class Proportions:
         """
         self._jaw, self._before, self._after = groups[_JAW], before, after
         self.changes = np.tile(np.eye(3), (len(before), 1, 1))
-        sums = _edge_sums(base, before, after)
+        faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
+        sums = _edge_sums(faces, before, after)
         skin = _evened(base, groups[_SKIN], *sums)
         self.changes[groups[_SKIN]] = skin[groups[_SKIN]]
         for name, vertices in groups.items():
@@ -71,10 +72,20 @@ class Proportions:
         return way + share * other
 
 
-def _edge_sums(base: BaseMesh, before: Floats, after: Floats) -> tuple[Floats, Floats]:
+def affine_form(faces: list[list[int]], before: Floats, after: Floats) -> Floats:
+    """The affine map [3, 3] that fits the change of a whole mesh best, without its shift.
+
+    Args:
+        faces: the vertices of each polygon.
+        before, after: float64[V, 3].
+    """
+    mixed, own = _edge_sums(faces, before, after)
+    return _solved(mixed.sum(axis=0)[None], own.sum(axis=0)[None])[0]
+
+
+def _edge_sums(faces: list[list[int]], before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """float64[V, 3, 3] each: sums of b a^T and of a a^T over the edges at each vertex (a before, b
     after), and over the vertex's normal, scaled to the length of an edge."""
-    faces = [[c[0] for c in face] for rows in base.faces.values() for face in rows]
     start = np.concatenate(faces)
     end = np.concatenate([face[1:] + face[:1] for face in faces])
     mixed = np.zeros((len(before), 3, 3))

@@ -9,11 +9,15 @@ import numpy as np
 
 from ..author.geometry.skeleton import Doubles
 from .errors import Stopped
+from .form.teeth import JawChange, jaw_change
 from .landmarks.find import Found, Hints, find_form
 from .landmarks.start import pairs_of, start_of
 from .registration import Registered, RegisterOptions, StoppedError, register
 from .surface import Surface
+from .telling import telling
 from .transfer.template import Progress, TemplateFace
+
+_FOUND = 0.15  # share of the work at whose end the template's own form is known
 
 
 @dataclass(frozen=True)
@@ -25,11 +29,13 @@ class Laid:
         trust: float64[V], 0 to 1: confidence in the position of each vertex.
         registered: the registration; None: none was needed because the head has the template's
             triangles.
+        jaw: difference of the lower teeth from the template; None: unknown.
     """
 
     points: Doubles
     trust: Doubles
     registered: Registered | None = None
+    jaw: JawChange | None = None
 
 
 def lay(
@@ -82,13 +88,20 @@ def lay_surface(
         Stopped: `progress` returned False.
     """
     if np.array_equal(template.triangles, target.triangles):
-        return Laid(target.points, np.ones(len(target.points)))
-    own = find_form(template, Hints(name, up=np.eye(3)[1], front=np.eye(3)[2]))
+        jaw = jaw_change(template, target.points, target, found.pose)
+        return Laid(target.points, np.ones(len(target.points)), None, jaw)
+    hints = Hints(name, up=np.eye(3)[1], front=np.eye(3)[2])
+    own = find_form(template, hints, telling(progress, 0.0, _FOUND))
     start = start_of(template, target, own, found)
     pairs = [(v, goal.tolist()) for v, goal in pairs_of(template, own, found)]
     options = RegisterOptions(threads=threads)
     try:
-        laid = register(template, target, pairs, options, start, progress)
+        laid = register(template, target, pairs, options, start, _rest(progress))
     except StoppedError:
         raise Stopped from None
-    return Laid(laid.points, laid.trusted.astype(np.float64), laid)
+    jaw = jaw_change(template, laid.points, template, own.pose)
+    return Laid(laid.points, laid.trusted.astype(np.float64), laid, jaw)
+
+
+def _rest(progress: Progress | None) -> Progress | None:
+    return None if progress is None else lambda share: progress(_FOUND + (1 - _FOUND) * share)

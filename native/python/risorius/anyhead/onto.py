@@ -29,6 +29,7 @@ from ..author.input.spec import Read
 from ..base.words import counted
 from .errors import Stopped
 from .fittings import Fittings, complete, head_parts, sort_parts
+from .fittings.lower_teeth import jaw_by_teeth
 from .landmarks.marks import Landmarks
 from .laying import lay
 from .repair import repair
@@ -112,7 +113,7 @@ def onto(
     notes = _own_shapes(parts)
     tell("looking for the face")
     _at(progress, 0.0)
-    head = stand(where, parts, unit, o.wishes, o.marks)
+    head = stand(where, parts, unit, o.wishes, o.marks, _part(progress, 0.0, _FACE))
     found = sort_parts(head.parts)
     face = found.face
     target = Surface.of_polygons(face.mesh.positions, face.mesh.faces)
@@ -124,7 +125,8 @@ def onto(
     laid = lay(source, target, head.found, o.threads, _part(progress, _TEMPLATE, _LAID))
     tell(f"carrying {counted(len(source.ways), 'expression')} over")
     wanted, rest = TransferOptions(o.strength, o.threads), _part(progress, _LAID, _CARRIED)
-    carried = transfer(source, target, laid.points, laid.trust, wanted, rest)
+    jaw = None if laid.jaw is None else jaw_by_teeth(laid.jaw, template, found)
+    carried = transfer(source, target, laid.points, laid.trust, wanted, rest, jaw)
     fitted, ways = complete(found, template, laid.points), whole_ways(carried.ways)
     mended = _mended(target, fitted, head, ways, o, _part(progress, _CARRIED, 1.0), tell)
     every = head_parts(fitted, {p[0]: way for p, way in mended.items() if len(p) == 1})

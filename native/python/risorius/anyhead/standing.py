@@ -14,11 +14,13 @@ from ..author.heads.parts import HeadPart, Wishes
 from ..author.heads.sizes import UNITS, check_unit, find_unit
 from ..author.input.obj import ObjMesh
 from ..web.kinds import kind_of
+from .balls import paired_balls
 from .errors import AnyHeadError
 from .form.standing import CHIN, TOP
 from .landmarks.find import Found, Hints, find_form
 from .landmarks.marks import LandmarkError, Landmarks
 from .surface import Surface
+from .telling import Progress
 
 _FLAT = 1e-3  # of the longest side
 _SNAP = 20.0  # degrees
@@ -43,7 +45,12 @@ class Standing:
 
 
 def stand(
-    where: str, parts: Sequence[HeadPart], unit: str, wishes: Wishes, marks: Landmarks | None
+    where: str,
+    parts: Sequence[HeadPart],
+    unit: str,
+    wishes: Wishes,
+    marks: Landmarks | None,
+    progress: Progress | None = None,
 ) -> Standing:
     """Find the face and turn and scale all meshes.
 
@@ -53,10 +60,12 @@ def stand(
         unit: of their numbers as the format has it, "cm" or "m".
         wishes: what is said and not guessed.
         marks: landmarks that a person gave, in the space of the parts.
+        progress: told the share that is done, 0 to 1; False stops.
 
     Raises:
         AnyHeadError: no polygons, or wishes that cannot be.
         LandmarkError: no face, or landmarks that are missing.
+        Stopped: progress said False.
     """
     wrong = check_axes(wishes) or (check_unit(wishes.unit) if wishes.unit else "")
     if wrong:
@@ -68,7 +77,8 @@ def stand(
     up, front = (axis_of(word) if word else None for word in (wishes.up, wishes.front))
     given = marks.points if marks is not None else {}
     skin, notes = _skin_of(where, able, wishes.mesh), []
-    found, backwards = _found(skin, Hints(where, given, up=up, front=front))
+    hints = Hints(where, given, up, front, paired_balls(able))
+    found, backwards = _found(skin, hints, progress)
     if backwards:
         notes.append("the polygons show their backs: they are turned")
     found.landmarks.require(where)
@@ -95,15 +105,15 @@ def stand(
     )
 
 
-def _found(skin: Surface, hints: Hints) -> tuple[Found, bool]:
+def _found(skin: Surface, hints: Hints, progress: Progress | None) -> tuple[Found, bool]:
     """The form of a head, and whether its polygons are to be turned. What hangs on it may be
     turned where the head is not."""
     if _inside_out(skin):
         try:
-            return find_form(Surface(skin.points, skin.triangles[:, ::-1]), hints), True
+            return find_form(Surface(skin.points, skin.triangles[:, ::-1]), hints, progress), True
         except LandmarkError:
             pass
-    return find_form(skin, hints), False
+    return find_form(skin, hints, progress), False
 
 
 def _skin_of(where: str, parts: Sequence[HeadPart], named: str) -> Surface:

@@ -7,7 +7,7 @@ Names, counts and layers stay, so that a program that reads the old file also re
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +16,12 @@ from ... import BlendShapeTarget, Dna, Mesh
 from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import FARTHEST, Doubles
 from ...base.errors import ArgumentError
-from ..errors import Stopped
+from ..telling import Progress, telling
 from .change import Change, Hold, similar, surface_of
 from .contacts import keep_contacts
-from .joints import Places, place_joints, shifts_carried
+from .jaw import jaw_between, mouth_of
+from .joints import Places, jaw_of, place_joints, shifts_carried
 from .parts import Ball, Eye, Stiff, eyes_of, finest, kind, mouth_way, skin_of, stiff_share
-
-Progress = Callable[[float], object]  # receives the finished share, 0 to 1; False stops the work
 
 
 class Moved(NamedTuple):
@@ -45,6 +44,7 @@ def conform(
     moved: Mapping[str, Doubles],
     progress: Progress | None = None,
     balls: Sequence[Ball] = (),
+    teeth: Doubles | None = None,
 ) -> Dna:
     """Conform a face to the vertex positions of another head.
 
@@ -61,6 +61,7 @@ def conform(
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
         balls: eyeballs of the target head; each eye of the face moves to the one near it.
+        teeth: float64[n, 3], the lower teeth of the target head, of any topology.
 
     Raises:
         ArgumentError: the face has no skin mesh, or `moved` lacks the skin, names an unknown mesh,
@@ -74,7 +75,10 @@ def conform(
     change = Change(dna.meshes[skin], before, given[dna.mesh_names[skin]])
     tell(0.2)
     world = sk.world_matrices(dna, np.zeros((len(dna.joint_names), 9)))[:, :3, 3]
-    stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth_way(dna, change))
+    joint = jaw_of(dna, [m for m in finest(dna) if kind(dna.mesh_names[m]) == "mouth"])
+    jaw = jaw_between(dna, skin, joint, change, given, teeth)
+    mouth = mouth_way(dna, change) if jaw is None else mouth_of(jaw, change.turn)
+    stiff = Stiff(skin, eyes_of(dna, change, given, world, balls), mouth, joint, jaw)
     meshes: dict[int, Moved] = {}
     for m in range(min(len(dna.meshes), len(dna.mesh_names))):
         if len(dna.meshes[m].positions):
@@ -87,31 +91,13 @@ def conform(
     ]
     tell(0.5)
     place_joints(out, places, change.turn)
-    out.joint_groups = shifts_carried(dna, places, change.turn)
+    out.joint_groups = shifts_carried(dna, places, change.turn, stiff)
     tell(0.6)
     rest = telling(progress, 0.6, 1.0)
     holds = {m: own.hold for m, own in meshes.items() if own.hold is not None}
     out = keep_contacts(dna, out, skin, change, stiff.eyes, holds, rest)
     tell(1.0)
     return out
-
-
-def telling(progress: Progress | None, begin: float, end: float) -> Callable[[float], bool]:
-    """A function that reports the progress of a part of the work.
-
-    It raises Stopped if `progress` returns False.
-
-    Args:
-        progress: receives the finished share of the whole work, 0 to 1.
-        begin, end: shares of the whole work at which the part begins and ends.
-    """
-
-    def tell(share: float) -> bool:
-        if progress is not None and progress(begin + (end - begin) * share) is False:
-            raise Stopped
-        return True
-
-    return tell
 
 
 def _checked(dna: Dna, moved: Mapping[str, Doubles], skin: int) -> dict[str, Doubles]:

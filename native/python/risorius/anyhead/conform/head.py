@@ -16,24 +16,18 @@ from ...author.heads.sizes import UNITS
 from ...author.input.obj import ObjMesh
 from ...base.words import joined
 from ..errors import AnyHeadError
+from ..fittings.lower_teeth import lower_teeth
 from ..fittings.sorting import sort_parts
 from ..landmarks.marks import Landmarks
 from ..laying import lay_surface
 from ..standing import Standing, stand
 from ..surface import Surface
-from .change import surface_of
-from .face import Progress, conform, telling
+from ..telling import Progress, telling
+from .axes import mm_of, standing_axes, standing_skin
+from .face import conform
 from .parts import Ball, finest, skin_of
 from .same import has_polygons_of, into_own_space, sculpted, turn_back
 
-_DIRECTIONS = {
-    "right": (1, 0, 0),
-    "left": (-1, 0, 0),
-    "up": (0, 1, 0),
-    "down": (0, -1, 0),
-    "front": (0, 0, 1),
-    "back": (0, 0, -1),
-}
 _STOOD, _LAID = 0.15, 0.75  # progress after landmarks are found, and after the skin is registered
 
 
@@ -107,10 +101,9 @@ def conform_face(
         notes = [f"{joined(list(there))}: the head has the topology of the face", note]
         made = conform(dna, there, telling(progress, 0.0, 1.0))
         return Conformed(made, there[name], list(there), [n for n in notes if n])
-    standing = stand(where, parts, unit, wishes, marks)
-    telling(progress, 0.0, _STOOD)(1.0)
-    points, balls = _laid(dna, skin, standing, threads, progress)
-    made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls)
+    standing = stand(where, parts, unit, wishes, marks, telling(progress, 0.0, _STOOD))
+    points, balls, teeth = _laid(dna, skin, standing, threads, progress)
+    made = conform(dna, {name: points}, telling(progress, _LAID, 1.0), balls, teeth)
     return Conformed(made, points, [], standing.notes)
 
 
@@ -133,12 +126,12 @@ def parts_of(dna: Dna) -> list[HeadPart]:
 
 def _laid(
     dna: Dna, skin: int, standing: Standing, threads: int, progress: Progress | None
-) -> tuple[Doubles, list[Ball]]:
-    """The vertex positions of the face's skin on a head, and the eyeballs of the head, in the axes,
-    the unit and the position of the face."""
+) -> tuple[Doubles, list[Ball], Doubles | None]:
+    """The vertex positions of the face's skin on a head, and the eyeballs and the lower teeth of
+    the head, in the axes, the unit and the position of the face."""
     axes, size = standing_axes(dna), mm_of(dna) / UNITS["cm"]
     before = np.asarray(dna.meshes[skin].positions, np.float64)
-    template = _outward(surface_of(dna.meshes[skin], size * before @ axes))
+    template = standing_skin(dna, skin)
     parts = sort_parts(standing.parts)
     face = parts.face.mesh
     target = Surface.of_polygons(face.positions, face.faces)
@@ -159,16 +152,8 @@ def _laid(
         return np.asarray((places @ back.T + shift) @ axes.T / size)
 
     balls = [Ball(there(eye.middle[None])[0], eye.radius / size) for eye in parts.eyes.values()]
-    return there(laid.points), balls
-
-
-def _outward(surface: Surface) -> Surface:
-    """The surface with triangles that face outward. Left-handed files have them inverted."""
-    middle = surface.points.mean(axis=0)
-    corners = surface.points[surface.triangles[:, 0]] - middle
-    if float((corners * surface.face_normals()).sum()) >= 0:
-        return surface
-    return Surface(surface.points, surface.triangles[:, ::-1])
+    lower = lower_teeth(parts)
+    return there(laid.points), balls, None if lower is None else there(lower)
 
 
 def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:
@@ -180,23 +165,3 @@ def is_same_topology(dna: Dna, mesh: ObjMesh) -> bool:
     """
     skin = skin_of(dna)
     return skin >= 0 and has_polygons_of(dna.meshes[skin], mesh)
-
-
-def standing_axes(dna: Dna) -> Doubles:
-    """float64[3, 3]: the axes of a file in the standing space (x left, y up, z front), as rows.
-
-    Standing positions are `points @ standing_axes(dna)`.
-
-    Args:
-        dna: the face.
-    """
-    return np.array([_DIRECTIONS[name] for name in dna.coordinate_system], np.float64)
-
-
-def mm_of(dna: Dna) -> float:
-    """Millimetres per unit of a file.
-
-    Args:
-        dna: the file.
-    """
-    return UNITS.get(dna.translation_unit, UNITS["cm"])

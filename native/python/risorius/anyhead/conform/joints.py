@@ -18,7 +18,8 @@ from ...author.geometry import skeleton as sk
 from ...author.geometry.skeleton import Doubles
 from ...rigs.rotation import Convention
 from .change import Change
-from .parts import Stiff, finest, kind
+from .jaw import joint_shifts
+from .parts import Stiff, finest
 
 _HELD = 1e-6  # sum of skin weights: a joint with less counts as a joint without vertices
 _SOME = (
@@ -59,10 +60,8 @@ class Places:
         for eye in stiff.eyes:
             own = list(eye.joints)
             self.after[own] = eye.way(self.before[own])
-        inside = [m for m in carried if kind(dna.mesh_names[m]) == "mouth"]
-        jaw = jaw_of(dna, inside)
-        if stiff.mouth is not None and jaw >= 0:  # the jaw bone is rigid with its teeth
-            self.after[jaw] = stiff.mouth(self.before[jaw])
+        if stiff.mouth is not None and stiff.joint >= 0:  # the jaw bone is rigid with its teeth
+            self.after[stiff.joint] = stiff.mouth(self.before[stiff.joint])
 
 
 def _means(dna: Dna, carried: Carried) -> Doubles:
@@ -147,19 +146,47 @@ def jaw_of(dna: Dna, mouth: Sequence[int]) -> int:
     return max(able.tolist(), key=lambda j: (held[j], -j), default=-1)
 
 
-def shifts_carried(dna: Dna, places: Places, turn: Doubles) -> list[JointGroup]:
+def shifts_carried(dna: Dna, places: Places, turn: Doubles, stiff: Stiff) -> list[JointGroup]:
     """The joint groups with the translation columns of the target head.
 
     Args:
         dna: the source face.
         places: the joint positions and gradients.
         turn: float64[3, 3], the rotation of the whole head.
+        stiff: the rigid parts of the face.
     """
     parents = np.asarray(dna.joint_parents, np.int64)
     roots = parents == np.arange(len(parents))
     old = np.where(roots[:, None, None], np.eye(3), places.turns[parents])
     new = np.where(roots[:, None, None], np.eye(3), turn @ old)
-    return [_carried(group, old, new, places) for group in dna.joint_groups]
+    groups = [_carried(group, old, new, places) for group in dna.joint_groups]
+    if stiff.jaw is not None:
+        at = stiff.joint
+        own = places.before[at], places.after[at]
+        _set_shifts(groups, at, joint_shifts(dna, at, stiff.jaw, turn, own) @ new[at])
+    return groups
+
+
+def _set_shifts(groups: Sequence[JointGroup], joint: int, shifts: Doubles) -> None:
+    """Write translation columns of a joint; a column that two groups have is written once.
+
+    Args:
+        groups: copies, changed in place.
+        joint: its index.
+        shifts: float64[columns, 3], in the axes of its parent.
+    """
+    left = shifts.copy()
+    for group in groups:
+        rows = np.asarray(group.output_indices, np.int64)
+        own = np.flatnonzero((rows // 9 == joint) & (rows % 9 < 3))
+        inputs = np.asarray(group.input_indices, np.int64)
+        if not len(own) or not len(inputs):
+            continue
+        values = np.asarray(group.values, np.float64).copy()
+        at = np.ix_(inputs, rows[own] % 9)
+        values[own] = left[at].T
+        left[at] = 0.0
+        group.values = values
 
 
 def _carried(group: JointGroup, old: Doubles, new: Doubles, places: Places) -> JointGroup:
@@ -167,7 +194,7 @@ def _carried(group: JointGroup, old: Doubles, new: Doubles, places: Places) -> J
     values = np.asarray(group.values, np.float64).copy()
     shift = np.flatnonzero((rows % 9 < 3) & (rows // 9 < len(old)))
     if not len(shift) or not values.size:
-        return group
+        return copy.copy(group)
     for joint in np.unique(rows[shift] // 9).tolist():
         own = shift[rows[shift] // 9 == joint]
         axes = rows[own] % 9

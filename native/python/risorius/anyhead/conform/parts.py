@@ -17,6 +17,7 @@ from ...author.geometry.simplify import pieces_of
 from ...author.geometry.skeleton import Doubles, Ints
 from ...author.heads.islands import ball_of
 from ...web.kinds import kind_of
+from ..form.teeth import JawChange
 from .change import Change, Similar, similar
 
 _ON_SKIN = re.compile(r"cartilage|caruncle", re.IGNORECASE)
@@ -55,11 +56,21 @@ class Ball(NamedTuple):
 
 
 class Stiff(NamedTuple):
-    """The index of the skin mesh, the eyeballs, and the transform of the inside of the mouth."""
+    """The rigid parts of a face.
+
+    Attributes:
+        skin: the index of the skin mesh.
+        eyes: the eyeballs.
+        mouth: the transform of the inside of the mouth; None: the face has none.
+        joint: the index of the jaw joint; -1: none.
+        jaw: the change of the lower jaw; None: unknown.
+    """
 
     skin: int
     eyes: Sequence[Eye]
     mouth: Similar | None
+    joint: int = -1
+    jaw: JawChange | None = None
 
 
 def kind(name: str) -> str:

@@ -16,6 +16,27 @@ FILE_NAME = "heads.npz"  # made by packaging/ship/make_head_form.py
 
 
 @dataclass(frozen=True)
+class TeethForm:
+    """A linear regression from the skin to the lower teeth, over the drawn heads.
+
+    Its 12 results are the centre of the teeth in cm, and row by row the matrix [3, 3] that maps the
+    teeth of the mean head to the teeth of this head.
+
+    Attributes:
+        vertices: int64[n], vertices of the skin that the regression reads.
+        ways: float64[12, n, 3], change of the results if a vertex moves 1 cm from the mean.
+        usual: float64[12], results for the mean skin.
+        mean, spread: float64[12], mean and standard deviation over all heads.
+    """
+
+    vertices: Ints
+    ways: Doubles
+    usual: Doubles
+    mean: Doubles
+    spread: Doubles
+
+
+@dataclass(frozen=True)
 class HeadForm:
     """A mean head plus weighted parts, in cm, y up, face towards +z, origin between the eyes.
 
@@ -30,6 +51,7 @@ class HeadForm:
         triangles: int64[T, 3].
         weights: float64[V], weight of each vertex in a fit, 0 to 1.
         places: the vertex index of each landmark by name.
+        teeth: the regression from the skin to the lower teeth.
     """
 
     mean: Doubles
@@ -39,6 +61,7 @@ class HeadForm:
     triangles: Ints
     weights: Doubles
     places: dict[str, int]
+    teeth: TeethForm
 
     @property
     def skin(self) -> int:
@@ -64,7 +87,14 @@ def head_form() -> HeadForm:
         form = packed["form"] * packed["form_scale"][:, None, None]
         parts = packed["parts"] * packed["part_scale"][:, None, None]
         places = zip(packed["names"].tolist(), packed["places"].tolist(), strict=True)
+        vertices = packed["teeth_vertices"].astype(np.int64)
+        ways = packed["teeth_ways"] * packed["teeth_scale"][:, None]
+        teeth = TeethForm(
+            vertices, ways.reshape(-1, len(vertices), 3), packed["teeth_usual"],
+            packed["teeth_mean"], packed["teeth_spread"],
+        )  # fmt: skip
         return HeadForm(
             form[0], parts, form[1:], tuple(packed["expressions"].tolist()),
             packed["triangles"].astype(np.int64), packed["weights"] / 255.0, dict(places),
+            teeth,
         )  # fmt: skip

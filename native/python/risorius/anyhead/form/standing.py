@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...author.geometry.skeleton import Doubles
 from ..surface import Surface
-from .fitting import FINE, PLACE, ROUGH, Held, Pose, Target, fit, pose_normals
+from ..telling import Progress, telling
+from .fitting import FINE, PLACE, ROUGH, Held, Pose, Step, Target, fit, pose_normals
 from .heads import HeadForm, head_form
 
 TOP, CHIN, BACK, FRONT = 11.5, -11.5, -15.0, 5.0  # of the mean form, cm
@@ -108,6 +109,7 @@ def find_standing(
     up: Doubles | None = None,
     front: Doubles | None = None,
     held: Held | None = None,
+    progress: Progress | None = None,
 ) -> list[Standing]:
     """The likeliest places of a head in a surface, the best first.
 
@@ -115,11 +117,16 @@ def find_standing(
         target: the surface.
         up, front: float64[3], where it has them; None: anywhere.
         held: vertices of the form whose places are known.
+        progress: told the share that is done, 0 to 1; False stops.
+
+    Raises:
+        Stopped: progress said False.
     """
     coarse = Target(coarsened(target.surface))
-    best = _best(target, coarse, turns(up, front), held)
+    best = _best(target, coarse, turns(up, front), held, telling(progress, 0.0, 0.5))
     if best[0].error > SURE and up is None and front is None:
-        best = sorted(best + _best(target, coarse, oblique(), held), key=lambda s: s.error)
+        more = _best(target, coarse, oblique(), held, telling(progress, 0.5, 1.0))
+        best = sorted(best + more, key=lambda s: s.error)
     return best
 
 
@@ -143,18 +150,31 @@ def oblique() -> list[Doubles]:
 
 
 def _best(
-    target: Target, coarse: Target, ways: Sequence[Doubles], held: Held | None
+    target: Target,
+    coarse: Target,
+    ways: Sequence[Doubles],
+    held: Held | None,
+    tell: Callable[[float], bool],
 ) -> list[Standing]:
     """The best places of a head that stands in one of several ways, the best first."""
     form = head_form()
     poses = [g for turn in ways for g in guesses(coarse.surface.points, turn)]
-    rated = _rated(coarse, [fit(coarse, pose, PLACE[:1], held) for pose in poses], form, 200)
-    placed = [fit(coarse, s.pose, PLACE[1:], held) for s in rated[:_PLACED]]
-    rated = _apart(_rated(coarse, placed, form, 300))[:_KEPT]
-    rated = _apart(_rated(coarse, [fit(coarse, s.pose, ROUGH, held) for s in rated], form, 900))
+
+    def fitted(on: Target, rated: Sequence[Pose], steps: Sequence[Step], share: int) -> list[Pose]:
+        out = list(rated)
+        for number in range(len(out)):
+            for step in steps:
+                tell((share + number / len(out)) / 4)
+                out[number] = fit(on, out[number], (step,), held)
+        return out
+
+    rated = _rated(coarse, fitted(coarse, poses, PLACE[:1], 0), form, 200)[:_PLACED]
+    rated = _rated(coarse, fitted(coarse, [s.pose for s in rated], PLACE[1:], 1), form, 300)
+    rated = _apart(rated)[:_KEPT]
+    rated = _rated(coarse, fitted(coarse, [s.pose for s in rated], ROUGH, 2), form, 900)
+    rated = _apart(rated)
     rated = [s for s in rated if s.error < _WORSE * rated[0].error][:_TRIED]
-    best = [fit(target, s.pose, FINE, held) for s in rated]
-    return _rated(target, best, form, 2000)
+    return _rated(target, fitted(target, [s.pose for s in rated], FINE, 3), form, 2000)
 
 
 def coarsened(surface: Surface) -> Surface:

@@ -13,6 +13,7 @@ from ..form.fitting import FINE, Held, Pose, Target, fit, form_normals
 from ..form.heads import head_form
 from ..form.standing import NO_FACE, Standing, find_standing
 from ..surface import Surface
+from ..telling import Progress, telling
 from .checks import LEAST, check_crossings, check_eyes, check_mesh, completed, lips_apart, pieces
 from .marks import FOUND, LandmarkError, Landmarks
 from .refine import refined
@@ -21,6 +22,7 @@ _HELD, _EYE = 60.0, 8.0  # how much a given landmark counts, and the middle of a
 _NEAR_EYE = 2.0  # cm of the form: farther from the model's eye an eyeball is none of this head
 _ON = 0.4  # cm of the form: a landmark so far from the surface is not on it
 _LARGE, _TRIED = 0.3, 4  # of the largest piece: what may be a head too; how many are looked at
+_LOOKED, _FITTED, _REFINED = 0.8, 0.85, 0.95  # shares of the work at whose ends the steps are
 _AWAY = 20.0  # cm of the form: what is so far from a face belongs to another
 
 
@@ -76,38 +78,51 @@ class Found:
             )
 
 
-def find_landmarks(target: Surface, hints: Hints | None = None) -> Landmarks:
+def find_landmarks(
+    target: Surface, hints: Hints | None = None, progress: Progress | None = None
+) -> Landmarks:
     """The landmarks of a head.
 
     Args:
         target: the head, standing or not, of any unit.
         hints: what is known of it.
+        progress: told the share that is done, 0 to 1; False stops.
 
     Raises:
         LandmarkError: there is no face in it, or one that cannot be used; says which.
+        Stopped: progress said False.
     """
-    return find_form(target, hints).landmarks
+    return find_form(target, hints, progress).landmarks
 
 
-def find_form(target: Surface, hints: Hints | None = None) -> Found:
+def find_form(
+    target: Surface, hints: Hints | None = None, progress: Progress | None = None
+) -> Found:
     """The landmarks of a head and the model of form in it.
 
     Args:
         target: the head, standing or not, of any unit.
         hints: what is known of it.
+        progress: told the share that is done, 0 to 1; False stops.
 
     Raises:
         LandmarkError: there is no face in it, or one that cannot be used; says which.
+        Stopped: progress said False.
     """
-    hints = hints or Hints()
+    hints, tell = hints or Hints(), telling(progress)
+    tell(0.0)
     check_mesh(hints.where, target)
-    seen, pose, error = _looked_at(target, hints)
+    seen, pose, error = _looked_at(target, hints, telling(progress, 0.0, _LOOKED))
+    tell(_LOOKED)
     held = _with_eyes(pose, hints)
     if held is not None:
         pose = fit(seen, pose, FINE[1:], held)
+        tell(_FITTED)
     points = refined(seen, pose)
+    tell(_REFINED)
     landmarks = _on_surface(seen, pose, points)
     check_crossings(hints.where, seen, pose)
+    tell(1.0)
     if hints.open_eyes:
         check_eyes(hints.where, seen, pose, points)
     for name, point in hints.marks.items():
@@ -115,32 +130,37 @@ def find_form(target: Surface, hints: Hints | None = None) -> Found:
     return Found(landmarks, pose, error, lips_apart(seen, pose, points))
 
 
-def _looked_at(target: Surface, hints: Hints) -> tuple[Target, Pose, float]:
+def _looked_at(target: Surface, hints: Hints, tell: Progress) -> tuple[Target, Pose, float]:
     """The piece of a surface that is a head, the model's pose in it and its error."""
     seen = Target(target)
-    best = _standing(seen, hints)[0]
+    best = _standing(seen, hints, tell)[0]
     parts = [p for p in pieces(target) if len(np.unique(p.triangles)) >= LEAST]
     parts = [p for p in parts if len(p.triangles) > _LARGE * len(parts[0].triangles)][:_TRIED]
     if best.error <= NO_FACE:
         others = [p for p in parts if _off(p, best.pose)]
     else:
         others = parts if len(parts) > 1 else []
-    heads = [(part, best) for part, best in _heads(others, hints) if best.error <= NO_FACE]
+    heads = [(part, best) for part, best in _heads(others, hints, tell) if best.error <= NO_FACE]
     if len(heads) + (best.error <= NO_FACE) > 1:
         raise LandmarkError(f"{hints.where}: one head was expected, found two: choose the mesh")
     if best.error <= NO_FACE:
         return seen, best.pose, best.error
     if heads:
         return heads[0][0], heads[0][1].pose, heads[0][1].error
-    raise LandmarkError(f"{hints.where}: {_why_none(seen, hints)}")
+    raise LandmarkError(f"{hints.where}: {_why_none(seen, hints, tell)}")
 
 
-def _standing(seen: Target, hints: Hints) -> list[Standing]:
-    return find_standing(seen, hints.up, hints.front, _held(hints))
+def _standing(seen: Target, hints: Hints, tell: Progress) -> list[Standing]:
+    return find_standing(seen, hints.up, hints.front, _held(hints), tell)
 
 
-def _heads(parts: Sequence[Surface], hints: Hints) -> list[tuple[Target, Standing]]:
-    return [(seen, _standing(seen, hints)[0]) for seen in map(Target, parts)]
+def _heads(parts: Sequence[Surface], hints: Hints, tell: Progress) -> list[tuple[Target, Standing]]:
+    return [(seen, _standing(seen, hints, _at_end(tell))[0]) for seen in map(Target, parts)]
+
+
+def _at_end(tell: Progress) -> Progress:
+    """Progress of work that seldom follows: it may be stopped, and its share stays at the end."""
+    return lambda _share: tell(1.0)
 
 
 def _off(part: Surface, pose: Pose) -> bool:
@@ -151,13 +171,13 @@ def _off(part: Surface, pose: Pose) -> bool:
     return large and float(np.linalg.norm(middle - [0.0, 0.0, -5.0])) > _AWAY
 
 
-def _why_none(seen: Target, hints: Hints) -> str:
+def _why_none(seen: Target, hints: Hints, tell: Progress) -> str:
     """Why no face was found, for a sentence."""
-    halves = completed(seen.surface)
-    if any(_standing(Target(whole), hints)[0].error <= NO_FACE for whole in halves):
+    halves, tell = completed(seen.surface), _at_end(tell)
+    if any(_standing(Target(whole), hints, tell)[0].error <= NO_FACE for whole in halves):
         return "half of the face is missing: mirror it (in Blender: the modifier Mirror)"
     turned = Target(Surface(seen.surface.points, seen.surface.triangles[:, ::-1]))
-    if _standing(turned, hints)[0].error <= NO_FACE:
+    if _standing(turned, hints, tell)[0].error <= NO_FACE:
         return (
             "the mesh is inside out: turn its faces (in Blender: Mesh, Normals, Recalculate "
             "Outside)"

@@ -2,8 +2,8 @@
 """What an expression does at each vertex of the template, as this head's form has it.
 
 The change of form says how far a motion goes here and which way. What the jaw takes along turns
-with it by the same angle on everybody, about a hinge that lies where this head's is; only what is
-left of the motion follows the form.
+with it by the same angle on everybody, from a place of the jaw that lies where this head's is; only
+what is left of the motion follows the form.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ import numpy as np
 
 from ...author.geometry.rigid import rigid_way
 from ...author.geometry.skeleton import Doubles
+from ..form.teeth import JawChange
+from .closing import BLINKS, closing_shares
 from .form import changes_of_form
 from .template import Pose, TemplateFace, left_over
 
@@ -23,23 +25,36 @@ _SPURIOUS = 0.002  # cm: a corrective ends where the template's does
 class Carrying:
     """From a template to the same vertices on another head."""
 
-    def __init__(self, face: TemplateFace, points: Doubles, trust: Doubles) -> None:
+    def __init__(
+        self,
+        face: TemplateFace,
+        points: Doubles,
+        trust: Doubles,
+        teeth: JawChange | None = None,
+    ) -> None:
         """Compares the two.
 
         Args:
             face: the template.
             points: float64[V, 3], its vertices on the other head, cm.
             trust: float64[V], 0 to 1: how sure the place of each is.
+            teeth: how the lower teeth differ; None: the form of the skin tells it.
         """
         self._face, self._points = face, points
         self._form = changes_of_form(face.surface, points, trust)
-        if face.jaw is not None:
-            self._place_jaw(trust)
+        self._jaw = self._jaw_by_form(trust) if teeth is None else teeth
+        self._closing: dict[str, Doubles] = {}
+        for control in BLINKS:
+            if (control,) in face.ways:
+                shares = closing_shares(face, points, control, self.carried((control,)))
+                if shares is not None:
+                    self._closing[control] = shares
 
-    def _place_jaw(self, trust: Doubles) -> None:
-        """The hinge on the other head, and how large its jaw is, from the form of what it moves."""
+    def _jaw_by_form(self, trust: Doubles) -> JawChange | None:
+        """The change of the jaw from the form of the skin that it moves."""
         face = self._face
-        assert face.jaw is not None
+        if face.jaw is None:
+            return None
         opening = face.ways.get(("jawOpen",))
         weight = np.ones(len(trust)) if opening is None else np.linalg.norm(opening, axis=1)
         weight = weight.astype(np.float64) * (trust + 1e-3)
@@ -47,9 +62,10 @@ class Carrying:
         form = np.einsum("v,vij->ij", weight, self._form)
         grown = float(np.log(np.cbrt(max(np.linalg.det(form), 1e-3))))
         # Heads of one bone have more or less flesh about it: small differences are such.
-        self._size = float(np.exp(grown * grown**2 / (grown**2 + _FLESH**2)))
+        size = float(np.exp(grown * grown**2 / (grown**2 + _FLESH**2)))
         middle, other = weight @ face.surface.points, weight @ self._points
-        self._hinge = other + self._size * (face.jaw.hinge - middle)
+        hinge = other + size * (face.jaw.hinge - middle)
+        return JawChange(face.jaw.hinge, hinge, size * np.eye(3))
 
     def ways(self, strength: float = 1.0) -> dict[Pose, Doubles]:
         """float64[V, 3] by pose, of what each control does alone, and of what is left over where
@@ -76,13 +92,20 @@ class Carrying:
         Args:
             pose: one of the template.
         """
+        way = self._by_form(pose)
+        for control in pose:
+            way = way * self._closing.get(control, 1.0)
+        return way
+
+    def _by_form(self, pose: Pose) -> Doubles:
         way = self._face.ways[pose].astype(np.float64)
-        jaw = self._face.jaw
-        if jaw is None or pose not in jaw.turns:
+        jaw, change = self._face.jaw, self._jaw
+        if jaw is None or change is None or pose not in jaw.turns:
             return np.asarray(np.einsum("vij,vj->vi", self._form, way))
         turn, shift = jaw.turns[pose]
         own = rigid_way(self._face.surface.points, jaw.hinge, turn, shift)
-        other = rigid_way(self._points, self._hinge, turn, self._size * shift)
+        moved = change.linear @ rigid_way(change.before[None], jaw.hinge, turn, shift)[0]
+        other = rigid_way(self._points, change.after, turn, moved)
         length = np.einsum("vi,vi->v", own, own) + _REST**2
         share = np.clip(np.einsum("vi,vi->v", way, own) / length, 0, 1)[:, None]
         return np.asarray(np.einsum("vij,vj->vi", self._form, way - share * own) + share * other)

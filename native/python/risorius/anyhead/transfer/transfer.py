@@ -9,6 +9,7 @@ import numpy as np
 
 from ...author.geometry.skeleton import Doubles
 from ..errors import AnyHeadError, Stopped
+from ..form.teeth import JawChange
 from ..surface import Surface
 from .carrying import Carrying
 from .spreading import Spreading
@@ -55,6 +56,7 @@ def transfer(
     trusted: Doubles,
     options: TransferOptions | None = None,
     progress: Progress | None = None,
+    teeth: JawChange | None = None,
 ) -> Transferred:
     """Transfer all poses of a template to a head onto which it was registered.
 
@@ -66,6 +68,7 @@ def transfer(
         options: strength and threads; None: the defaults.
         progress: receives the finished share of the work, 0 to 1; stops the work if it returns
             False.
+        teeth: difference of the lower teeth from the template; None: predicted from the skin.
 
     Raises:
         AnyHeadError: no vertex of the head is near the template, or the strength is out of range.
@@ -75,7 +78,7 @@ def transfer(
     if not STRENGTHS[0] <= o.strength <= STRENGTHS[1]:
         raise AnyHeadError(f"strength: a number from 0 to 1.5 was expected, found {o.strength:g}")
     trust = np.asarray(trusted, np.float64)
-    ways = Carrying(face, points, trust).ways(o.strength)
+    ways = Carrying(face, points, trust, teeth).ways(o.strength)
     _tell(progress, 0.1)
     lying = Surface(points, face.surface.triangles)
     spreading = Spreading(target, lying, trust, _parting(face, ways), o.threads)

@@ -12,7 +12,8 @@ import numpy as np
 
 from ... import Dna
 from ...anyhead.conform import Conformed, conform_face
-from ...anyhead.conform.head import mm_of, parts_of
+from ...anyhead.conform.axes import mm_of
+from ...anyhead.conform.head import parts_of
 from ...anyhead.conform.parts import skin_of
 from ...anyhead.landmarks.marks import landmarks_path, read_landmarks
 from ...anyhead.reading import read_head

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: MIT
+"""Eyeballs among the meshes of a head that stands in no known way: balls that come in pairs."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..author.geometry.skeleton import Doubles
+from ..author.heads.islands import Ball, ball_of, islands_of
+from ..author.heads.parts import HeadPart
+
+_LEAST = 12  # vertices of a ball
+_MOST = 400  # islands of a mesh: hair and crowds of buttons have more
+_LARGE = 0.3  # of the longest side of all meshes: no eye is as wide
+_ALIKE = 0.1  # of the radius, by which both eyes of a pair may differ
+_APART = (2.0, 9.0)  # radii from one eye of a pair to the other
+
+
+def paired_balls(parts: Sequence[HeadPart]) -> list[Doubles]:
+    """float64[3] each: middles of balls that have a partner of their size beside them.
+
+    Args:
+        parts: meshes of a head, of any unit and direction.
+    """
+    whole = np.concatenate([part.mesh.positions for part in parts])
+    longest = float(np.ptp(whole, axis=0).max())
+    balls = [ball for part in parts for ball in _balls(part, longest)]
+    out: dict[int, Doubles] = {}
+    for (i, one), (k, other) in itertools.combinations(enumerate(balls), 2):
+        larger = max(one.radius, other.radius)
+        apart = float(np.linalg.norm(one.middle - other.middle)) / larger
+        if abs(one.radius - other.radius) < _ALIKE * larger and _APART[0] < apart < _APART[1]:
+            out[i], out[k] = one.middle, other.middle
+    return list(out.values())
+
+
+def _balls(part: HeadPart, longest: float) -> list[Ball]:
+    points, labels = part.mesh.positions, islands_of(part.mesh)
+    sizes = np.bincount(labels)
+    if len(sizes) > _MOST:
+        return []
+    order = np.argsort(labels, kind="stable")
+    out = []
+    for own in np.split(order, np.cumsum(sizes)[:-1]):
+        if len(own) >= _LEAST and np.ptp(points[own], axis=0).max() < _LARGE * longest:
+            ball = ball_of(points, own)
+            if ball is not None:
+                out.append(ball)
+    return out

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: MIT
+"""The jaw of a head by its own lower teeth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ... import Dna
+from ...author.geometry.skeleton import Doubles
+from ..form.teeth import JawChange, shown_by
+from .fitted import JAW, TEETH, Fittings
+from .sorting import sort_parts
+from .template_parts import template_parts
+
+
+def lower_teeth(fittings: Fittings) -> Doubles | None:
+    """float64[n, 3]: the vertices of the lower teeth; None: there are none by themselves.
+
+    Args:
+        fittings: of a head.
+    """
+    rows = fittings.of(TEETH)
+    lower = [row.part.mesh.positions for row in rows if row.hangs == JAW]
+    if not lower or len(lower) == len(rows):
+        return None
+    return np.concatenate(lower)
+
+
+def jaw_by_teeth(told: JawChange, template: Dna, found: Fittings) -> JawChange:
+    """The change of the jaw from a template, by the lower teeth of both heads where both have some.
+
+    Args:
+        told: what the skin tells.
+        template: a face of a DNA file.
+        found: the meshes of the head.
+    """
+    after = lower_teeth(found)
+    if after is None:
+        return told
+    before = lower_teeth(sort_parts(template_parts(template)[1]))
+    return told if before is None else shown_by(told, before, after)

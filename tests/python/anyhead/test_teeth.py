@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""The jaw of a head by its skin and by its own teeth; eyeballs before a head stands; stopping."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import jointed_face
+import numpy as np
+import pytest
+from risorius.anyhead.balls import paired_balls
+from risorius.anyhead.conform.jaw import joint_shifts
+from risorius.anyhead.errors import Stopped
+from risorius.anyhead.form.fitting import Pose
+from risorius.anyhead.form.heads import head_form
+from risorius.anyhead.form.teeth import JawChange, jaw_change, shown_by
+from risorius.anyhead.landmarks.find import Hints, find_form
+from risorius.anyhead.surface import Surface
+from risorius.anyhead.transfer.carrying import Carrying
+from risorius.anyhead.transfer.template import Jaw, TemplateFace
+from risorius.author.geometry import skeleton as sk
+from risorius.author.geometry.rigid import rigid_way
+from risorius.author.heads.parts import HeadPart
+from risorius.author.input.obj import ObjMesh
+
+Y, Z = np.eye(3)[1], np.eye(3)[2]
+
+
+@cache
+def mean() -> Surface:
+    form = head_form()
+    return Surface(form.mean[: form.skin], form.triangles)
+
+
+def still() -> Pose:
+    return Pose(np.eye(3), 1.0, np.zeros(3))
+
+
+def turn(degrees: float) -> np.ndarray:
+    s, c = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+def changed(points: np.ndarray) -> JawChange:
+    found = jaw_change(mean(), points, mean(), still())
+    assert found is not None
+    return found
+
+
+def test_the_same_head_has_the_same_jaw_and_a_turned_large_one_a_turned_large_one() -> None:
+    same = changed(mean().points)
+    assert np.abs(same.linear - np.eye(3)).max() < 1e-9
+    assert np.abs(same.after - same.before).max() < 1e-9
+    assert -8 < same.before[1] < -4  # below the eyes, cm
+    other = changed(1.3 * mean().points @ turn(20).T + [1, 120, -3])
+    assert np.abs(other.linear - 1.3 * turn(20)).max() < 1e-9
+    assert np.abs(other.after - (1.3 * turn(20) @ same.before + [1, 120, -3])).max() < 1e-9
+
+
+def test_a_skin_of_no_human_form_does_not_make_a_jaw_of_no_human_size() -> None:
+    noise = np.random.default_rng(3).normal(size=mean().points.shape)
+    found, told = changed(mean().points + 3.0 * noise), head_form().teeth
+    size = np.cbrt(np.linalg.det(found.linear))
+    assert 0.5 < size < 2.0
+    assert np.abs(found.after - found.before).max() < 3 * told.spread[:3].max() + 2.0
+    half = Surface(mean().points, mean().triangles[:50])
+    assert jaw_change(half, half.points, half, still()) is None
+
+
+def test_own_teeth_show_the_jaw_unless_they_are_of_another_model() -> None:
+    teeth = np.random.default_rng(5).uniform(-1, 1, (200, 3)) * [2.5, 0.5, 2.0] + [0, -6, 3]
+    told = JawChange(np.array([0.0, -6.0, 3.0]), np.array([0.0, -6.0, 3.0]), np.eye(3))
+    own = shown_by(told, teeth, 1.04 * teeth + [0, -0.1, 0.2])
+    middle = (teeth.min(axis=0) + teeth.max(axis=0)) / 2
+    assert np.abs(own.after - (1.04 * middle + [0, -0.1, 0.2])).max() < 1e-9
+    assert np.abs(own.linear - 1.04**0.5 * np.eye(3)).max() < 1e-9
+    for other in (1.5 * teeth, teeth - np.array([0, 1.0, 0]), teeth * [1, 0, 1]):
+        assert shown_by(told, teeth, other) is told
+
+
+def test_what_the_jaw_takes_along_moves_as_the_teeth_do() -> None:
+    points = mean().points
+    hinge, shift, rotation = np.array([0.0, -1.0, -7.0]), np.array([0.0, -0.4, 0.5]), turn(20)
+    way = np.where(points[:, 1:2] < -7, rigid_way(points, hinge, rotation, shift), 0.0)
+    pose = ("jawOpen",)
+    face = TemplateFace("", mean(), 0, pose, {pose: way.astype(np.float32)},
+                        Jaw(hinge, {pose: (rotation, shift)}))  # fmt: skip
+    teeth = JawChange(np.array([0.0, -6.0, 3.0]), np.array([0.0, -6.3, 3.1]), 1.1 * np.eye(3))
+    got = Carrying(face, points, np.ones(len(points)), teeth).carried(pose)
+    chin = np.argmax((points[:, 2] - points[:, 1]) * (np.abs(points[:, 0]) < 1))
+    moved = 1.1 * rigid_way(teeth.before[None], hinge, rotation, shift)[0]
+    wanted = rigid_way(points, teeth.after, rotation, moved)
+    assert np.linalg.norm(got[chin] - wanted[chin]) < 0.01
+
+
+def test_the_joint_of_the_jaw_moves_so_that_the_teeth_do() -> None:
+    dna = jointed_face.build()
+    columns, none = sk.column_count(dna), np.zeros((len(dna.joint_names), 9))
+    rotated = np.abs(sk.column_deltas(dna, columns)[:, :, 3:6]).max(axis=(0, 2))
+    joint = int(rotated.argmax())
+    at = sk.world_matrices(dna, none)[joint]
+    teeth = JawChange(at[:3, 3] + [0, -2, 3], at[:3, 3] + [0, -2.2, 3.1], 1.2 * np.eye(3))
+    after = at[:3, 3] + [0.1, 0.2, 0.3]
+    shifts = joint_shifts(dna, joint, teeth, np.eye(3), (at[:3, 3], after))
+    for column in range(columns):
+        alone = none.copy()
+        alone[joint] = sk.column_deltas(dna, columns)[column, joint]
+        motion = sk.world_matrices(dna, alone)[joint] @ np.linalg.inv(at)
+        own = motion[:3, :3] @ teeth.before + motion[:3, 3] - teeth.before
+        there = after + shifts[column] + motion[:3, :3] @ (teeth.after - after)
+        assert np.abs(there - teeth.after - 1.2 * own).max() < 1e-9
+
+
+def ball(middle: tuple[float, float, float], radius: float, name: str) -> HeadPart:
+    up, around = np.meshgrid(np.linspace(0.2, 2.9, 9), np.linspace(0, 6, 12), indexing="ij")
+    points = np.stack([np.sin(up) * np.cos(around), np.cos(up), np.sin(up) * np.sin(around)], -1)
+    points = radius * points.reshape(-1, 3) + middle
+    rows = np.arange(9 * 12).reshape(9, 12)
+    faces = np.stack([rows[:-1, :-1], rows[1:, :-1], rows[1:, 1:], rows[:-1, 1:]], -1)
+    faces = faces.reshape(-1, 4).tolist()
+    mesh = ObjMesh(points, np.zeros((0, 2)), faces, [[]] * len(faces))
+    return HeadPart(name, mesh, source=name)
+
+
+def test_balls_that_come_in_pairs_may_be_eyes() -> None:
+    head = ball((0, 0, 0), 1, "head")
+    head.mesh.positions[:] *= [9, 12, 10]
+    eyes = [ball((3, 0, 9), 1.2, "a"), ball((-3, 0, 9), 1.21, "b")]
+    button = ball((0, -12, 9), 0.4, "button")
+    found = np.array(paired_balls([head, *eyes, button]))
+    assert np.abs(found - [[3, 0, 9], [-3, 0, 9]]).max() < 0.01
+    assert paired_balls([head, eyes[0], button]) == []
+
+
+def test_the_search_for_a_face_tells_how_far_it_is_and_stops() -> None:
+    heard: list[float] = []
+    find_form(mean(), Hints(up=Y, front=Z), heard.append)
+    assert heard == sorted(heard)
+    assert heard[0] == 0.0
+    assert heard[-1] == 1.0
+    assert len(heard) > 20
+    told: list[float] = []
+
+    def stop(share: float) -> bool:
+        told.append(share)
+        return share < 0.1
+
+    with pytest.raises(Stopped):
+        find_form(mean(), Hints(up=Y, front=Z), stop)
+    assert len(told) < len(heard)
