@@ -56,7 +56,7 @@ def _lists(group: JointGroup) -> tuple[bytes, ...]:
 
 
 def _mean(groups: Sequence[JointGroup], share: Share) -> JointGroup:
-    """The weighted mean of joint groups with equal rows and columns, one group from each mixed face."""
+    """The weighted mean of joint groups with equal rows and columns, one from each mixed face."""
     first = groups[0]
     rows = np.asarray(first.output_indices, np.int64)
     values = sum(_weights(share, p, rows)[:, None] * g.values for p, g in enumerate(groups))
