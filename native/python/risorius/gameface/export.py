@@ -14,20 +14,24 @@ import numpy.typing as npt
 
 from .._native import Dna, Rig
 from ..base.words import counted, joined
+from ..web.textures import base_name
 from . import faces
 from .avatar import licence
 from .avatar.vrm import Manner
+from .body.reading import Body, read_body
 from .combining import Combination, Sums, chosen, driver_table
 from .errors import GameFaceError
+from .joints.hanging import hung
+from .joints.skeleton import Skeleton, facing_back, find_skeleton
 from .manner import measured
 from .materials import Materials
 from .parts import Points, axes_of
 from .refining import POSES, Refiner
-from .skeleton import Skeleton, facing_back, find_skeleton
 from .targets import Target, find_targets
 from .wishes import Wishes
 from .writing import Change, Written, write
 
+Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
 _SMALL = 256  # pixels: smaller textures show, quantized vertices do not
@@ -97,7 +101,7 @@ def _as_avatar(wishes: Wishes, out: str) -> Wishes:
     Raises:
         GameFaceError: a VRM whose licence is not said.
     """
-    if not (wishes.vrm or wishes.humanoid):
+    if not (wishes.vrm or wishes.humanoid or wishes.body):
         return wishes
     if wishes.vrm:
         licence.checked(wishes.licence, wishes.vrm, out)
@@ -176,6 +180,7 @@ class _Maker:
         self._dna, self._rig, self._targets = dna, rig, targets
         self._materials = Materials(dna, file)
         self._file = file
+        self._body: Body | None = None
         self._lod = -1
         self._wishes = Wishes()
         self.notes: list[str] = []
@@ -194,16 +199,21 @@ class _Maker:
             delta = deltas[one.name] if one.name in deltas else self._sums.combination(one)
             changes.append(Change(one.name, "combinations", delta))
         written = write(
-            self._points, self._skeleton, self._materials, changes, wishes, self._manner
-        )
+            self._points, self._skeleton, self._materials, changes, wishes, self._manner,
+            self._body,
+        )  # fmt: skip
         self.notes = self._combined + list(dict.fromkeys(self._materials.notes))
+        self.notes += self._body.notes if self._body else []
         return written
 
     def _take_level(self, wishes: Wishes) -> None:
         self._lod = wishes.lod
-        self._skeleton = self._find_skeleton(wishes)
+        self._skeleton, move = self._find_skeleton(wishes)
         axes = axes_of(self._dna, faces_back=wishes.vrm == "0.x")
-        self._points = Points(self._dna, self._rig, wishes.lod, self._skeleton, axes)
+        self._points = Points(self._dna, self._rig, wishes.lod, self._skeleton, axes, move)
+        self._points.parts = [
+            p for p in self._points.parts if not {base_name(p.mesh), p.mesh} & set(wishes.without)
+        ]
         if not self._points.parts:
             raise GameFaceError(
                 f"{self._file}: meshes at LOD {wishes.lod} were expected, there are none"
@@ -240,15 +250,32 @@ class _Maker:
         self._refined = self._refiner.found(poses, room)
         self.made = self.made + [one for one, _ in self._refined]
 
-    def _find_skeleton(self, wishes: Wishes) -> Skeleton:
+    def _own_meshes(self) -> set[str]:
+        """Names of the face's meshes, with and without their levels."""
+        return {*self._dna.mesh_names, *map(base_name, self._dna.mesh_names)}
+
+    def _find_skeleton(self, wishes: Wishes) -> tuple[Skeleton, Doubles]:
+        """The joints, and metres that the face moves to its body."""
+        move = np.zeros(3)
+        if wishes.body and self._body is None:
+            self._body = read_body(
+                wishes.body, scale=wishes.body_scale,
+                without=[n for n in wishes.without if n not in self._own_meshes()],
+                needs_all=bool(wishes.vrm),
+            )  # fmt: skip
         try:
             found = find_skeleton(
-                self._dna, axes_of(self._dna), kind=wishes.humanoid, is_body=bool(wishes.vrm),
+                self._dna, axes_of(self._dna), kind=wishes.humanoid,
+                is_body=bool(wishes.vrm) and self._body is None,
                 is_turned=wishes.humanoid == "mixamo" and wishes.vrm != "0.x",
             )  # fmt: skip
+            if self._body is not None:
+                found, move = hung(found, self._body)
         except GameFaceError as error:
             raise GameFaceError(f"{self._file}: {error}") from None
-        return facing_back(found) if wishes.vrm == "0.x" else found
+        if wishes.vrm == "0.x":
+            return facing_back(found), move * [-1.0, 1.0, -1.0]
+        return found, move
 
     def lines(self, written: Written) -> list[str]:
         """For each group of targets how many, on how many vertices, bytes, and what sums leave."""

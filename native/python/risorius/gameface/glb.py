@@ -24,6 +24,7 @@ _VERTICES, _CORNERS = 34962, 34963
 class Glb:
     """Attributes:
     table: the JSON; whoever writes nodes and meshes adds to its lists.
+    pictures: name of a picture of the face -> its texture.
     packs: lists of vertices and corners are packed by meshoptimizer.
     sparse: lists that hold zeros for the most part are kept by their other rows.
     """
@@ -31,6 +32,7 @@ class Glb:
     def __init__(self, *, packs: bool = False, sparse: bool = False) -> None:
         self.packs, self.sparse = packs, sparse
         self.table: dict[str, Any] = {"accessors": [], "bufferViews": []}
+        self.pictures: dict[str, int] = {}
         self._binary = bytearray()
         self._unpacked = 0  # bytes of the buffer that is not there, which packed views stand for
 
@@ -80,6 +82,11 @@ class Glb:
         else:
             view = self.view(flat.tobytes(), target=_CORNERS)
         return self._accessor({**about, "bufferView": view})
+
+    def plain(self, values: Numbers) -> int:
+        """An accessor of bytes as they are. Args: values: [n, k], as of vertices."""
+        about = self._about(values, False, False)
+        return self._accessor({**about, "bufferView": self.view(values.tobytes())})
 
     def matrices(self, values: Numbers) -> int:
         """An accessor of matrices. Args: values: float[n, 4, 4], rows first."""

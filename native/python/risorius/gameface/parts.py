@@ -14,8 +14,8 @@ from ..author.geometry.skeleton import skin_entries
 from ..solving.surface import Surface
 from ..web.kinds import kind_of
 from .errors import GameFaceError
+from .joints.skeleton import Skeleton
 from .naming import safe
-from .skeleton import Skeleton
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -64,7 +64,10 @@ class Points:
         axes: float64[3, 3] from the file's axes to those of the glTF, metres.
     """
 
-    def __init__(self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles) -> None:
+    def __init__(
+        self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles,
+        move: Doubles | None = None,
+    ) -> None:  # fmt: skip
         """Of a level.
 
         Args:
@@ -73,6 +76,7 @@ class Points:
             lod: of the file.
             skeleton: of its joints.
             axes: as axes_of gives them.
+            move: float64[3], metres that the face moves to the body that it hangs on.
         """
         surface = Surface(dna, rig, lod)
         meshes = [m for m in surface.mesh_indices if len(dna.meshes[m].positions)]
@@ -82,7 +86,7 @@ class Points:
         points = np.stack([mesh, vertex], axis=1)
         self._probe = surface.probe(points)
         self._face = dna.name or "the face"
-        self.axes = axes
+        self.axes, self._move = axes, np.zeros(3) if move is None else move
         self.rest = self.at(np.asarray(rig.initial_raw_controls, np.float32))
         starts = np.concatenate([[0], np.cumsum(counts)])
         made = [
@@ -100,7 +104,7 @@ class Points:
         Raises:
             GameFaceError: a pose has places that are no numbers.
         """
-        found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T
+        found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
             raise GameFaceError(
                 f"{self._face}: vertices nearer than 10 km were expected, "

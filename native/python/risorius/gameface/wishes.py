@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 TEXTURES = 1024
@@ -29,6 +30,10 @@ class Wishes:
         humanoid: of avatar.humanoid.KINDS: missing bones are made up; "": none.
         vrm: 1.0 or 0.x, "": a glTF that is no VRM.
         licence: fields of a VRM, as avatar.licence asks for them.
+        body: a character in glTF or VRM that the face is hung on; None: the face alone.
+        body_scale: metres of a unit of the body; None: found by its height.
+        without: names of meshes of the body, or of the face, that are left out.
+        springs: long hair of a VRM swings.
     """
 
     shapes: Sequence[str] = ("arkit", "visemes")
@@ -46,3 +51,7 @@ class Wishes:
     humanoid: str = ""
     vrm: str = ""
     licence: Mapping[str, Any] = field(default_factory=dict)
+    body: Path | None = None
+    body_scale: float | None = None
+    without: Sequence[str] = ()
+    springs: bool = True

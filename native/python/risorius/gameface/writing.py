@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -11,11 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from .avatar import vrm
+from .body.reading import Body
+from .body.writing import Put, frames, put_meshes
 from .glb import QUANTIZED, Glb
+from .joints.nodes import add_nodes, node_of
+from .joints.skeleton import Skeleton
 from .materials import Materials
 from .naming import unlike
 from .parts import INFLUENCES, Part, Points, normals_of
-from .skeleton import Skeleton
 from .wishes import Wishes
 
 Doubles = npt.NDArray[np.float64]
@@ -53,6 +56,7 @@ def write(
     changes: Sequence[Change],
     wishes: Wishes,
     manner: vrm.Manner,
+    body: Body | None = None,
 ) -> Written:
     """The file.
 
@@ -63,9 +67,11 @@ def write(
         changes: the targets in the order in which meshes have them.
         wishes: how lists are kept.
         manner: of the face, for a VRM.
+        body: that the skeleton hangs on; None: the face alone.
     """
     farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
     writer = _Writer(points, skeleton, materials, wishes, farthest)
+    writer.body = body
     return writer.file(changes, manner)
 
 
@@ -76,6 +82,8 @@ class _Writer:
     ) -> None:  # fmt: skip
         self.points, self.skeleton, self.materials = points, skeleton, materials
         self.wishes = wishes
+        self.body: Body | None = None
+        self.node_of = list(range(len(skeleton.names)))
         self.glb = Glb(packs=wishes.meshopt, sparse=wishes.sparse)
         self.step, self.middle = 1.0, np.zeros(3)
         if wishes.quantize:
@@ -91,7 +99,7 @@ class _Writer:
     def file(self, changes: Sequence[Change], manner: vrm.Manner) -> Written:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
-        roots = [self._joints(nodes)] if self.wishes.skeleton else []
+        roots = self._joints(nodes) if self.wishes.skeleton else []
         # TalkingHead looks for meshes below the armature; elsewhere nothing stands above a skin.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
@@ -112,9 +120,11 @@ class _Writer:
             nodes.append(node)
         if self.wishes.humanoid == "mixamo":
             self._add_soles(below)
+        put = self._put_body(roots, names)
+        shown += put.meshes
         table.update(scene=0, scenes=[{"name": "Face", "nodes": roots}])
         if self.wishes.vrm:
-            self._make_vrm(shown, changes, manner)
+            self._make_vrm(shown, changes, manner, put.plain)
         groups = {
             group: (len(self.names[group]), int(self.moved[group].sum()), size)
             for group, size in self.bytes.items()
@@ -122,18 +132,25 @@ class _Writer:
         return Written(self.glb.data(), groups)
 
     def _make_vrm(
-        self, shown: Sequence[vrm.Shown], changes: Sequence[Change], manner: vrm.Manner
-    ) -> None:
+        self, shown: Sequence[vrm.Shown], changes: Sequence[Change], manner: vrm.Manner,
+        plain: Mapping[int, Mapping[str, Any]],
+    ) -> None:  # fmt: skip
         own, table = self.skeleton, self.glb.table
         head, eyes = own.places[own.head], [own.bones.get(f"{s}Eye") for s in ("left", "right")]
         known = [own.places[eye] for eye in eyes if eye is not None]
+        bones = {name: self.node_of[joint] for name, joint in own.bones.items()}
+        if self.body:  # the body's neck and head move those of the face
+            moved = {name: bones[name] for name in bones if name not in ("neck", "head")}
+            bones = {**self.body.bones, **moved}
+            head = frames(self.body, self.wishes.vrm)[0][self.body.bones["head"]]
         avatar = vrm.Avatar(
-            own.bones,  # nodes of joints come first, so their numbers are those of the joints
+            bones,
             (np.mean(known, axis=0) - head).tolist() if known else [0.0, 0.0, 0.0],
             shown,
             [c.name for c in changes if c.group not in ("vrm", "combinations")],
             self.wishes.licence,
             manner,
+            plain,
         )
         name, made = vrm.extension(self.wishes.vrm, avatar, table.get("materials", []))
         table.setdefault("extensions", {})[name] = made
@@ -172,31 +189,42 @@ class _Writer:
         on = is_head[part.joints][part.weights > 0]
         return "thirdPersonOnly" if on.all() else "auto" if on.any() else "both"
 
-    def _joints(self, nodes: list[dict[str, Any]]) -> int:
-        """The number of the root's node."""
-        own, first = self.skeleton, len(nodes)
-        for i, name in enumerate(own.names):
-            parent = own.parents[i]
-            above = own.places[parent] if parent >= 0 else np.zeros(3)
-            turn = own.turns[parent] if parent >= 0 else np.eye(3)
-            place = turn.T @ (own.places[i] - above)
-            node: dict[str, Any] = {"name": name, "translation": place.tolist()}
-            quaternion = _quaternion(turn.T @ own.turns[i])
-            if quaternion != [0, 0, 0, 1]:
-                node["rotation"] = quaternion
-            below = [first + j for j, parent in enumerate(own.parents) if parent == i]
-            if below:
-                node["children"] = below
-            nodes.append(node)
+    def _joints(self, nodes: list[dict[str, Any]]) -> list[int]:
+        """The numbers of the nodes that stand above no other."""
+        own, body = self.skeleton, self.body
+        roots = [0]
+        if body:
+            places, turns = frames(body, self.wishes.vrm)
+            add_nodes(nodes, body.names, body.parents, places, turns)
+            roots = [i for i, parent in enumerate(body.parents) if parent < 0]
+            self.node_of = [own.hooks[0], *range(len(nodes), len(nodes) + len(own.names) - 1)]
+        taken = {node["name"].lower() for node in nodes}
+        for i in range(bool(body), len(own.names)):
+            if i in own.hooks and body:
+                above, place, turn = own.hooks[i], places[own.hooks[i]], turns[own.hooks[i]]
+            elif own.parents[i] >= 0:
+                parent = own.parents[i]
+                above, place, turn = self.node_of[parent], own.places[parent], own.turns[parent]
+            else:
+                above, place, turn = -1, np.zeros(3), np.eye(3)
+            name = unlike(own.names[i], taken)
+            nodes.append(node_of(name, own.places[i] - place, own.turns[i], turn))
+            if above >= 0:
+                nodes[above].setdefault("children", []).append(self.node_of[i])
         inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
         back = np.swapaxes(own.turns, 1, 2)
         inverse[:, :3, :3] = back * self.step  # what a skin turns has no node that would scale it
         inverse[:, :3, 3] = np.einsum("jab,jb->ja", back, self.middle - own.places)
-        joints = [first + i for i in range(len(own.names))]
-        self.glb.table["skins"] = [
-            {"joints": joints, "skeleton": first, "inverseBindMatrices": self.glb.matrices(inverse)}
-        ]
-        return first
+        skin = {"joints": self.node_of, "inverseBindMatrices": self.glb.matrices(inverse)}
+        self.glb.table["skins"] = [skin if body else {**skin, "skeleton": 0}]
+        return roots
+
+    def _put_body(self, roots: list[int], names: set[str]) -> Put:
+        """The meshes of the body beside those of the face."""
+        if not self.body:
+            return Put()
+        called = [unlike(mesh.name, names) for mesh in self.body.meshes]
+        return put_meshes(self.body, self.glb, called, self.wishes.vrm, roots)
 
     def _mesh(self, part: Part, changes: Sequence[Change], whole: bool) -> dict[str, Any]:
         glb, rest = self.glb, self.points.rest[part.rows]
@@ -271,19 +299,3 @@ class _Writer:
         if not self.wishes.quantize:
             return self.glb.vertices(np.ascontiguousarray(values, "<f4"))
         return self.glb.vertices(np.rint(values * 255).astype("u1"), normalized=True)
-
-
-def _quaternion(turn: Doubles) -> list[float]:
-    """x, y, z, w of a rotation matrix."""
-    x, y, z = np.diag(turn)
-    squares = np.array([1 + x - y - z, 1 - x + y - z, 1 - x - y + z, 1 + x + y + z])
-    largest = int(squares.argmax())  # the others are divided by it
-    m = turn
-    rows = (
-        (squares[0], m[0, 1] + m[1, 0], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]),
-        (m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]),
-        (m[2, 0] + m[0, 2], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]),
-        (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]),
-    )
-    row = np.array(rows[largest]) / (2 * np.sqrt(squares[largest]))
-    return [float(v) + 0.0 for v in row / np.linalg.norm(row)]

@@ -75,6 +75,7 @@ class Avatar:
         own: names of targets that are expressions by their own name.
         said: the licence.
         manner: what was measured.
+        plain: number of a material -> what VRM 0.x says of it, where a body has said so.
     """
 
     bones: Mapping[str, int]
@@ -83,6 +84,7 @@ class Avatar:
     own: Sequence[str]
     said: Mapping[str, Any]
     manner: Manner
+    plain: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
 
     def binds(self, name: str) -> Iterator[tuple[Shown, int]]:
         """Meshes that have a target, and its number there."""
@@ -150,9 +152,11 @@ def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, An
     groups = [_group(avatar, n, _OLD[n]) for n in _OLD if _is_there(avatar, n)]
     more = [n for n in ("surprised", *avatar.own) if n not in _OLD and _is_there(avatar, n)]
     groups += [_group(avatar, name, "unknown") for name in dict.fromkeys(more)]
+    eyes = avatar.eyes
     first: dict[str, Any] = {
         "firstPersonBone": avatar.bones["head"],
-        "firstPersonBoneOffset": dict(zip("xyz", avatar.eyes, strict=True)),
+        # Unity's z, which is against glTF's.
+        "firstPersonBoneOffset": {"x": eyes[0], "y": eyes[1], "z": -eyes[2]},
         "meshAnnotations": [
             {"mesh": s.mesh, "firstPersonFlag": _OLD_FIRST[s.first]} for s in avatar.meshes
         ],
@@ -173,7 +177,10 @@ def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, An
         "firstPerson": first,
         "blendShapeMaster": {"blendShapeGroups": groups},
         "secondaryAnimation": {"boneGroups": [], "colliderGroups": []},
-        "materialProperties": [_plain(material["name"]) for material in materials],
+        "materialProperties": [
+            avatar.plain.get(number) or _plain(material["name"])
+            for number, material in enumerate(materials)
+        ],
     }
 
 

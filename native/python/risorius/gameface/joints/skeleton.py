@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .._native import Dna
-from ..author.geometry.skeleton import world_matrices
-from ..base.words import joined
-from .avatar import humanoid
-from .errors import GameFaceError
+from ..._native import Dna
+from ...author.geometry.skeleton import world_matrices
+from ...base.words import joined
+from ..avatar import humanoid
+from ..errors import GameFaceError
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -41,6 +41,7 @@ class Skeleton:
     head: the joint that takes what hangs on none.
     turns: float64[n, 3, 3], from each joint's axes to those of glTF.
     bones: VRM's name of a bone -> its joint here.
+    hooks: joint -> node of a body that it hangs on; the root is that node itself.
     """
 
     names: list[str]
@@ -50,6 +51,7 @@ class Skeleton:
     head: int
     turns: Doubles
     bones: dict[str, int] = field(default_factory=dict)
+    hooks: dict[int, int] = field(default_factory=dict)
 
 
 def find_skeleton(
@@ -105,7 +107,8 @@ def find_skeleton(
 
 def facing_back(skeleton: Skeleton) -> Skeleton:
     """The same, turned about the vertical: VRM 0.x looks against z. Args: skeleton: upright."""
-    return replace(skeleton, places=skeleton.places * [-1.0, 1.0, -1.0])
+    turns = np.tile(np.eye(3), (len(skeleton.names), 1, 1))  # VRM 0.x turns no bone
+    return replace(skeleton, places=skeleton.places * [-1.0, 1.0, -1.0], turns=turns)
 
 
 def _own(dna: Dna, *, is_body: bool) -> dict[str, int]:
