@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .._native import Dna, Rig
+from ..author.geometry.simplify import fan_triangles
 from ..base.words import counted, joined
 from ..web.textures import base_name
 from . import faces
@@ -21,6 +22,7 @@ from .avatar.vrm import Manner
 from .body.reading import Body, read_body
 from .combining import Combination, Sums, chosen, driver_table
 from .errors import GameFaceError
+from .joints.hair import Chains, Hair, add_chains, is_long
 from .joints.hanging import hung
 from .joints.skeleton import Skeleton, facing_back, find_skeleton
 from .manner import measured
@@ -200,7 +202,7 @@ class _Maker:
             changes.append(Change(one.name, "combinations", delta))
         written = write(
             self._points, self._skeleton, self._materials, changes, wishes, self._manner,
-            self._body,
+            self._body, self._chains,
         )  # fmt: skip
         self.notes = self._combined + list(dict.fromkeys(self._materials.notes))
         self.notes += self._body.notes if self._body else []
@@ -218,6 +220,9 @@ class _Maker:
             raise GameFaceError(
                 f"{self._file}: meshes at LOD {wishes.lod} were expected, there are none"
             )
+        self._chains = Chains()
+        if wishes.vrm and wishes.springs:
+            self._add_chains()
         self._sums = Sums(self._points, self._rig, self._targets)
         presets = {t.name: t for t in self._targets if t.group == "vrm"}
         self._manner = measured(self._points, self._sums, presets) if wishes.vrm else Manner()
@@ -249,6 +254,25 @@ class _Maker:
         self._refiner = Refiner(self._points, self._rig, self._sums, mine, self.made)
         self._refined = self._refiner.found(poses, room)
         self.made = self.made + [one for one, _ in self._refined]
+
+    def _add_chains(self) -> None:
+        """Joints in hair that is long at the finest level, as coarse levels join cards."""
+        parts, long = self._points.parts, list[int]()
+        up = axes_of(self._dna)
+        for number, part in enumerate(parts):
+            if part.kind == "hair":
+                names = [base_name(name) for name in self._dna.mesh_names]
+                finest = self._dna.meshes[names.index(base_name(part.mesh))]
+                triangles = finest.layout_positions.astype(np.int64)[fan_triangles(finest)]
+                if is_long(finest.positions.astype(np.float64) @ up.T, triangles):
+                    long.append(number)
+        hairs = [
+            Hair(self._points.rest[p.rows], p.rows, p.triangles, p.joints, p.weights)
+            for p in (parts[number] for number in long)
+        ]
+        self._skeleton, self._chains, made = add_chains(self._skeleton, hairs)
+        for number, hair in zip(long, made, strict=True):
+            parts[number] = replace(parts[number], joints=hair.joints, weights=hair.weights)
 
     def _own_meshes(self) -> set[str]:
         """Names of the face's meshes, with and without their levels."""

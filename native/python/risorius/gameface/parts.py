@@ -15,6 +15,7 @@ from ..solving.surface import Surface
 from ..web.kinds import kind_of
 from .errors import GameFaceError
 from .joints.skeleton import Skeleton
+from .joints.weights import INFLUENCES, strongest
 from .naming import safe
 
 Doubles = npt.NDArray[np.float64]
@@ -26,7 +27,6 @@ _AXES = {
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
 _FARTHEST = 1e4  # metres
-INFLUENCES = 4  # of a vertex, as every client takes them
 
 
 @dataclass(frozen=True)
@@ -199,9 +199,4 @@ def _skin(mesh: Mesh, skeleton: Skeleton) -> tuple[Ints, Doubles]:
     vertex, joint, weight = skin_entries(mesh)
     np.add.at(dense, (vertex, skeleton.of_joint[joint]), weight)
     dense[dense.sum(axis=1) <= 0, skeleton.head] = 1.0
-    joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
-    weights = np.take_along_axis(dense, joints, axis=1)
-    steps = np.rint(255 * weights / weights.sum(axis=1, keepdims=True))
-    steps[:, 0] += 255 - steps.sum(axis=1)  # the strongest takes what rounding leaves
-    joints[steps <= 0] = 0
-    return joints, steps / 255
+    return strongest(dense)

@@ -10,15 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .avatar import vrm
+from .avatar import springs, vrm
 from .body.reading import Body
 from .body.writing import Put, frames, put_meshes
 from .glb import QUANTIZED, Glb
+from .joints.hair import Chains
 from .joints.nodes import add_nodes, node_of
 from .joints.skeleton import Skeleton
+from .joints.weights import INFLUENCES
 from .materials import Materials
 from .naming import unlike
-from .parts import INFLUENCES, Part, Points, normals_of
+from .parts import Part, Points, normals_of
 from .wishes import Wishes
 
 Doubles = npt.NDArray[np.float64]
@@ -57,6 +59,7 @@ def write(
     wishes: Wishes,
     manner: vrm.Manner,
     body: Body | None = None,
+    chains: Chains | None = None,
 ) -> Written:
     """The file.
 
@@ -68,10 +71,11 @@ def write(
         wishes: how lists are kept.
         manner: of the face, for a VRM.
         body: that the skeleton hangs on; None: the face alone.
+        chains: joints of the skeleton that swing.
     """
     farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
     writer = _Writer(points, skeleton, materials, wishes, farthest)
-    writer.body = body
+    writer.body, writer.chains = body, chains or Chains()
     return writer.file(changes, manner)
 
 
@@ -83,6 +87,7 @@ class _Writer:
         self.points, self.skeleton, self.materials = points, skeleton, materials
         self.wishes = wishes
         self.body: Body | None = None
+        self.chains = Chains()
         self.node_of = list(range(len(skeleton.names)))
         self.glb = Glb(packs=wishes.meshopt, sparse=wishes.sparse)
         self.step, self.middle = 1.0, np.zeros(3)
@@ -151,10 +156,27 @@ class _Writer:
             self.wishes.licence,
             manner,
             plain,
+            self._springs(),
         )
         name, made = vrm.extension(self.wishes.vrm, avatar, table.get("materials", []))
         table.setdefault("extensions", {})[name] = made
         self.glb.uses(name, required=False)
+        if self.wishes.vrm == "1.0" and avatar.springs.springs:
+            table["extensions"][springs.EXTENSION] = springs.table_1(avatar.springs)
+            self.glb.uses(springs.EXTENSION, required=False)
+
+    def _springs(self) -> springs.Springs:
+        """Chains of long hair, and those that the body has."""
+        own, chains = self.skeleton, self.chains
+        if not chains.joints:
+            return springs.Springs()
+        offset = own.turns[own.head].T @ (chains.centre - own.places[own.head])
+        ball = springs.Collider(self.node_of[own.head], offset.tolist(), chains.radius)
+        rows = [
+            springs.Spring(f"Hair{i}", [self.node_of[j] for j in chain], [0], chains.hit)
+            for i, chain in enumerate(chains.joints, 1)
+        ]
+        return springs.Springs(rows, [ball])
 
     def _add_soles(self, below: list[int]) -> None:
         """Two triangles of a millimetre where a body without meshes stands: TalkingHead lowers an

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import licence
+from .springs import Springs, table_0
 
 PRESETS = (
     "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh",
@@ -76,6 +77,7 @@ class Avatar:
         said: the licence.
         manner: what was measured.
         plain: number of a material -> what VRM 0.x says of it, where a body has said so.
+        springs: chains that swing.
     """
 
     bones: Mapping[str, int]
@@ -85,6 +87,7 @@ class Avatar:
     said: Mapping[str, Any]
     manner: Manner
     plain: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
+    springs: Springs = field(default_factory=Springs)
 
     def binds(self, name: str) -> Iterator[tuple[Shown, int]]:
         """Meshes that have a target, and its number there."""
@@ -176,7 +179,7 @@ def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, An
         },
         "firstPerson": first,
         "blendShapeMaster": {"blendShapeGroups": groups},
-        "secondaryAnimation": {"boneGroups": [], "colliderGroups": []},
+        "secondaryAnimation": table_0(avatar.springs),
         "materialProperties": [
             avatar.plain.get(number) or _plain(material["name"])
             for number, material in enumerate(materials)
