@@ -237,6 +237,11 @@ BAD = {
             extensions={"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}})),
         "KHR_draco_mesh_compression",
     ),
+    "a spring of no node": (
+        edited(lambda j: j.update(extensions={"VRMC_springBone": {
+            "springs": [{"joints": [{"node": 400}]}]}})),
+        "VRMC_springBone.springs[0]: nodes[400] was expected",
+    ),
     "a head below": (
         edited(lambda j: j["nodes"][0].update(rotation=[1, 0, 0, 0], scale=[1, 1, 1])),
         "stands upright along y",

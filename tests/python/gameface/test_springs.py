@@ -151,3 +151,39 @@ def test_hair_on_a_body_hangs_below_its_head_bone(haired, tmp_path):
     stiff = made(haired, tmp_path, "--no-springs", body=("--body", str(path)))
     name = hair_of(found)
     assert np.abs(found.positions(name) - stiff.positions(name)).max() < 1e-6
+
+
+def balls_of(found):
+    """Where colliders are in the scene, the first node of each chain, and the way down."""
+    tables, world, nodes = found.json["extensions"], found._world(), found.json["nodes"]
+    if "VRMC_springBone" in tables:
+        table = tables["VRMC_springBone"]
+        balls = [(row["node"], row["shape"]["sphere"]["offset"]) for row in table["colliders"]]
+        first = {nodes[row["joints"][0]["node"]]["name"] for row in table["springs"]}
+        down = [row["joints"][0]["gravityDir"] for row in table["springs"]]
+    else:
+        table = tables["VRM"]["secondaryAnimation"]
+        balls = [
+            (row["node"], [ball["offset"]["x"], ball["offset"]["y"], -ball["offset"]["z"]])
+            for row in table["colliderGroups"] for ball in row["colliders"]
+        ]  # fmt: skip
+        first = {nodes[bone]["name"] for row in table["boneGroups"] for bone in row["bones"]}
+        down = [[row["gravityDir"][axis] for axis in "xyz"] for row in table["boneGroups"]]
+    return np.array([world[n] @ [*at, 1] for n, at in balls])[:, :3], first, down
+
+
+@pytest.mark.parametrize("before", ["1.0", "0.x"])
+@pytest.mark.parametrize("after", ["1.0", "0.x"])
+def test_springs_of_a_body_swing_in_both_versions(haired, face, tmp_path, before, after):  # noqa: F811
+    own = made(haired, tmp_path, version=before)
+    path = tmp_path / "body.vrm"
+    (tmp_path / "anna.vrm").rename(path)
+    found = made(face, tmp_path, version=after, body=("--body", str(path)))
+    turn = np.array([-1, 1, -1]) if before != after else np.ones(3)
+    (at, first, down), (goal, wanted, _) = balls_of(found), balls_of(own)
+    assert np.abs(at - goal * turn).max() < 1e-6
+    assert first == wanted
+    assert np.abs(np.array(down) - [0, -1, 0]).max() == 0
+    for name in own.meshes():
+        [same] = [n for n in found.meshes() if n in (name, f"{name}_2")][-1:]
+        assert np.abs(found.positions(same) - own.positions(name) * turn).max() < 1e-5

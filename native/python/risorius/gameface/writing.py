@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -129,7 +129,7 @@ class _Writer:
         shown += put.meshes
         table.update(scene=0, scenes=[{"name": "Face", "nodes": roots}])
         if self.wishes.vrm:
-            self._make_vrm(shown, changes, manner, put.plain)
+            self._make_vrm(shown, changes, manner, put)
         groups = {
             group: (len(self.names[group]), int(self.moved[group].sum()), size)
             for group, size in self.bytes.items()
@@ -138,7 +138,7 @@ class _Writer:
 
     def _make_vrm(
         self, shown: Sequence[vrm.Shown], changes: Sequence[Change], manner: vrm.Manner,
-        plain: Mapping[int, Mapping[str, Any]],
+        put: Put,
     ) -> None:  # fmt: skip
         own, table = self.skeleton, self.glb.table
         head, eyes = own.places[own.head], [own.bones.get(f"{s}Eye") for s in ("left", "right")]
@@ -155,8 +155,8 @@ class _Writer:
             [c.name for c in changes if c.group not in ("vrm", "combinations")],
             self.wishes.licence,
             manner,
-            plain,
-            self._springs(),
+            put.plain,
+            self._springs().joined(put.springs),
         )
         name, made = vrm.extension(self.wishes.vrm, avatar, table.get("materials", []))
         table.setdefault("extensions", {})[name] = made
@@ -166,7 +166,7 @@ class _Writer:
             self.glb.uses(springs.EXTENSION, required=False)
 
     def _springs(self) -> springs.Springs:
-        """Chains of long hair, and those that the body has."""
+        """Chains of long hair."""
         own, chains = self.skeleton, self.chains
         if not chains.joints:
             return springs.Springs()

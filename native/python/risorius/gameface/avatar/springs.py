@@ -41,6 +41,7 @@ class Spring:
         gravity: strength of gravity, 0 to 2.
         down: direction of gravity in the scene.
         center: node whose motion is left out; -1 for none.
+        is_branch: it hangs on another chain, which in VRM 0.x takes it along.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Spring:
     gravity: float = 0.05
     down: Sequence[float] = (0.0, -1.0, 0.0)
     center: int = -1
+    is_branch: bool = False
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,8 @@ def table_0(all_: Springs) -> dict[str, Any]:
         groups.append({"node": one.node, "colliders": list(_balls(one))})
     alike = dict[tuple[Any, ...], dict[str, Any]]()
     for spring in all_.springs:
+        if spring.is_branch:
+            continue
         said = {k: v for k, v in vars(spring).items() if k not in ("name", "nodes")}
         key = tuple(map(str, said.values()))
         if key not in alike:

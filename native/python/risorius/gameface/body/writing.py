@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..avatar.springs import Springs
 from ..avatar.vrm import Shown
 from ..glb import Glb
 from .looks import Looks
 from .meshes import BodyMesh, Piece
 from .reading import Body
+from .springs import springs_of
 
 Doubles = npt.NDArray[np.float64]
 
@@ -27,10 +29,12 @@ class Put:
     Attributes:
         meshes: with the numbers of their nodes and meshes.
         plain: VRM 0.x's rows of materials, by the number of the material.
+        springs: of a body that is a VRM.
     """
 
     meshes: list[Shown] = field(default_factory=list)
     plain: dict[int, dict[str, Any]] = field(default_factory=dict)
+    springs: Springs = field(default_factory=Springs)
 
 
 def frames(body: Body, version: str) -> tuple[Doubles, Doubles]:
@@ -60,8 +64,10 @@ def put_meshes(body: Body, glb: Glb, names: list[str], version: str, below: list
     """
     looks = Looks(body.document, glb, is_old=version == "0.x")
     places, turns = frames(body, version)
-    writer = _Writer(body, glb, looks, places, turns, _FLIP if version == "0.x" else np.ones(3))
-    out, nodes = Put(), glb.table["nodes"]
+    flip = _FLIP if version == "0.x" else np.ones(3)
+    writer = _Writer(body, glb, looks, places, turns, flip)
+    springs = springs_of(body, places, turns, flip) if version else Springs()
+    out, nodes = Put(springs=springs), glb.table["nodes"]
     for mesh, name in zip(body.meshes, names, strict=True):
         if not mesh.pieces:
             continue
