@@ -213,9 +213,10 @@ class _Maker:
         self._skeleton, move = self._find_skeleton(wishes)
         axes = axes_of(self._dna, faces_back=wishes.vrm == "0.x")
         self._points = Points(self._dna, self._rig, wishes.lod, self._skeleton, axes, move)
-        self._points.parts = [
-            p for p in self._points.parts if not {base_name(p.mesh), p.mesh} & set(wishes.without)
-        ]
+        if self._body is not None:
+            out = set(self._body.others)
+            parts = self._points.parts
+            self._points.parts = [p for p in parts if not {base_name(p.mesh), p.mesh} & out]
         if not self._points.parts:
             raise GameFaceError(
                 f"{self._file}: meshes at LOD {wishes.lod} were expected, there are none"
@@ -274,17 +275,13 @@ class _Maker:
         for number, hair in zip(long, made, strict=True):
             parts[number] = replace(parts[number], joints=hair.joints, weights=hair.weights)
 
-    def _own_meshes(self) -> set[str]:
-        """Names of the face's meshes, with and without their levels."""
-        return {*self._dna.mesh_names, *map(base_name, self._dna.mesh_names)}
-
     def _find_skeleton(self, wishes: Wishes) -> tuple[Skeleton, Doubles]:
         """The joints, and metres that the face moves to its body."""
         move = np.zeros(3)
         if wishes.body and self._body is None:
+            names = {*self._dna.mesh_names, *map(base_name, self._dna.mesh_names)}
             self._body = read_body(
-                wishes.body, scale=wishes.body_scale,
-                without=[n for n in wishes.without if n not in self._own_meshes()],
+                wishes.body, scale=wishes.body_scale, without=wishes.without, faces=names,
                 needs_all=bool(wishes.vrm),
             )  # fmt: skip
         try:

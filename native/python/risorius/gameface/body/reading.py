@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -52,6 +52,7 @@ class Body:
         scale: metres of a unit of the file.
         to_scene: float64[4, 4], from the scene of the file to this one.
         world: number of a node -> float64[4, 4] to this scene.
+        others: names to leave out that are meshes of the face.
         notes: sentences for the user.
     """
 
@@ -66,6 +67,7 @@ class Body:
     scale: float
     to_scene: Doubles
     world: Mapping[int, Doubles]
+    others: list[str]
     notes: list[str] = field(default_factory=list)
 
     def above(self, name: str) -> int:
@@ -78,17 +80,20 @@ class Body:
         return self.bones[bone] if bone else max(0, self.parents[self.bones["head"]])
 
 
-def read_body(path: Path, *, scale: float | None, without: Sequence[str], needs_all: bool) -> Body:
+def read_body(
+    path: Path, *, scale: float | None, without: Sequence[str], faces: Set[str], needs_all: bool
+) -> Body:
     """A body.
 
     Args:
         path: of a .glb, .gltf or .vrm.
         scale: metres of a unit of the file; None: 0.01 if the body is taller than 20 units, else 1.
         without: names of meshes, or of their nodes, that are left out.
+        faces: names of the face's meshes, which `without` may name too.
         needs_all: each bone that a VRM needs must be there, else the head alone.
 
     Raises:
-        GameFaceError: no skeleton, bones are missing, no mesh of a name in `without`.
+        GameFaceError: no skeleton, bones are missing, no mesh has a name in `without`.
         AnimationFileError: the file is damaged; with the place in it.
         BudgetError: more numbers than a file of this size may hold.
     """
@@ -97,7 +102,7 @@ def read_body(path: Path, *, scale: float | None, without: Sequence[str], needs_
     raw = Meshes(document, tree.world)
     rows = document.json["nodes"]
     holders = [n for n in tree.order if "mesh" in rows[n]]
-    holders = _kept(document, holders, without)
+    holders, others = _kept(document, holders, without, faces)
     joints = {j for n in tree.order if "mesh" in rows[n] and "skin" in rows[n]
               for j in raw.joints(n)}  # fmt: skip
     if not joints:
@@ -120,7 +125,7 @@ def read_body(path: Path, *, scale: float | None, without: Sequence[str], needs_
     body = Body(
         document, own.names, own.parents, own.places, own.turns, own.of_node,
         {name: own.of_node[node] for name, node in bones.items()},
-        [meshes.read(n) for n in holders], scale, to_scene, world,
+        [meshes.read(n) for n in holders], scale, to_scene, world, others,
     )  # fmt: skip
     for mesh in body.meshes:  # a mesh without a skin turns with the node that it hangs on
         mesh.joints = [j if j in own.of_node else tree.above[j] for j in mesh.joints]
@@ -137,20 +142,26 @@ def _opened(path: Path) -> Document:
     return open_gltf(path, named_json.parse(decode(data, str(path)), str(path)), budget=budget)
 
 
-def _kept(document: Document, holders: list[int], without: Sequence[str]) -> list[int]:
-    """The nodes whose meshes stay. Raises: GameFaceError: no mesh has that name."""
+def _kept(
+    document: Document, holders: list[int], without: Sequence[str], faces: Set[str]
+) -> tuple[list[int], list[str]]:
+    """The nodes whose meshes stay, and the names that are meshes of the face.
+
+    Raises: GameFaceError: no mesh has a name.
+    """
     rows, names = document.json["nodes"], dict[int, tuple[str, str]]()
     for number in holders:
         mesh = document.item("meshes", rows[number]["mesh"], f"nodes[{number}].mesh")
         also = str(mesh.get("name") or f"mesh{rows[number]['mesh']}")
         names[number] = (str(rows[number].get("name") or also), also)
-    for wish in without:
-        if not any(wish in pair for pair in names.values()):
+    others = [wish for wish in without if not any(wish in pair for pair in names.values())]
+    for wish in others:
+        if wish not in faces:
             there = joined(sorted({pair[0] for pair in names.values()})) or "none"
             raise GameFaceError(
                 f"{document.name}: --without {wish}: a mesh of the body was expected: {there}"
             )
-    return [number for number in holders if not set(names[number]) & set(without)]
+    return [n for n in holders if not set(names[n]) & set(without)], others
 
 
 def _scale_of(at: Mapping[str, Doubles]) -> float:
