@@ -282,3 +282,44 @@ def test_options_of_a_body_that_do_not_go_together(face, tmp_path, capsys):  # n
         assert (code, said in line) == (2, True), line
     code, line = sentence(capsys, face, *out, "--body", path, "--without", "Nose")
     assert (code, "--without Nose: a mesh of the body was expected: BodyHead" in line) == (1, True)
+
+
+def test_a_body_that_draco_packed(face, tmp_path):  # noqa: F811
+    package = pytest.importorskip("DracoPy", reason="NOT RUN: DracoPy is not installed")
+    body = BodyFile()
+    primitive = body.json["meshes"][0]["primitives"][0]
+    number = primitive["attributes"]["POSITION"]
+    own = GlbFile(body.data()).numbers(number).astype(np.float32)
+    packed = package.encode(
+        own, np.array([[0, 1, 2], [0, 2, 3]]), quantization_bits=20, preserve_order=True
+    )
+    del body.json["accessors"][number]["bufferView"]
+    primitive["extensions"] = {"KHR_draco_mesh_compression": {
+        "bufferView": body.view(packed), "attributes": {"POSITION": 0}}}  # fmt: skip
+    found = hung(face, tmp_path, body)
+    for name, at in body.shown.items():
+        assert np.abs(found.positions(name) - at).max() < 1e-5
+    assert "KHR_draco_mesh_compression" not in str(found.json)
+
+
+def test_a_vrm_0_keeps_what_its_body_says_of_materials(face, tmp_path):  # noqa: F811
+    body = BodyFile(back=True)
+    own = {"hips": "Hips", "spine": "Spine", "head": "Head", "leftThumbProximal": "LeftHand"}
+    bones = {bone: body.number[name] for bone, name in own.items()}
+    for side in ("Left", "Right"):
+        parts = {"Arm": "UpperArm", "ForeArm": "LowerArm", "Hand": "Hand", "UpLeg": "UpperLeg",
+                 "Leg": "LowerLeg", "Foot": "Foot"}  # fmt: skip
+        bones.update({side.lower() + new: body.number[side + old] for old, new in parts.items()})
+    rows = [{"name": n, "shader": "VRM/MToon", "textureProperties": {"_MainTex": 0}} for n in "ab"]
+    body.json["extensions"] = {"VRM": {
+        "humanoid": {"humanBones": [{"bone": b, "node": n} for b, n in bones.items()]},
+        "materialProperties": rows}}  # fmt: skip
+    found = hung(face, tmp_path, body, version="0.x")
+    table = found.json["extensions"]["VRM"]
+    [row] = [r for r in table["materialProperties"] if r["shader"] == "VRM/MToon"]
+    names = [material["name"] for material in found.json["materials"]]
+    material = found.json["materials"][names.index("Cloth")]
+    assert row["name"] == "Cloth"
+    number = material["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+    assert row["textureProperties"] == {"_MainTex": number}
+    assert "leftThumbProximal" in {r["bone"] for r in table["humanoid"]["humanBones"]}

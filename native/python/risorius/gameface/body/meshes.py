@@ -117,10 +117,9 @@ class Meshes:
         ]
         also = str(mesh.get("name") or f"mesh{number}")
         count = max((len(p.targets) for p in pieces), default=0)
-        return BodyMesh(
-            str(row.get("name") or also), also, joints, [p for p in pieces if len(p.values)],
-            target_names(mesh, count),
-        )  # fmt: skip
+        pieces = [piece for piece in pieces if len(piece.values["POSITION"])]
+        name = str(row.get("name") or also)
+        return BodyMesh(name, also, joints, pieces, target_names(mesh, count))
 
     def _moves(self, node: int, joints: Sequence[int]) -> Doubles:
         """float64[joints, 4, 4] from the mesh's numbers to the scene."""

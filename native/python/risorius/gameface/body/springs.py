@@ -49,11 +49,11 @@ class _Reader:
             self._collider(row, f"{at}.colliders[{i}]")
             for i, row in enumerate(_rows(table, "colliders"))
         ]
-        groups = [list(_rows(row, "colliders")) for row in _rows(table, "colliderGroups")]
+        groups = [_numbers(row, "colliders") for row in _rows(table, "colliderGroups")]
         out = list[Spring]()
         for i, row in enumerate(_rows(table, "springs")):
             place = f"{at}.springs[{i}]"
-            joints = [joint for joint in _rows(row, "joints") if isinstance(joint, dict)]
+            joints = _rows(row, "joints")
             nodes = [self._node(joint.get("node"), place) for joint in joints]
             if not nodes:
                 continue
@@ -184,7 +184,14 @@ class _Reader:
         return [float(v) for v in np.array(self._vector(value, place)) * self._down]
 
 
-def _rows(table: Mapping[str, Any], key: str) -> list[Any]:
+def _rows(table: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
+    """The tables in a list of a table."""
     found = table.get(key)
-    rows = found if isinstance(found, list) else []
-    return [row for row in rows if isinstance(row, dict | int)]
+    return (
+        [row if isinstance(row, dict) else {} for row in found] if isinstance(found, list) else []
+    )
+
+
+def _numbers(table: Mapping[str, Any], key: str) -> list[Any]:
+    found = table.get(key)
+    return found if isinstance(found, list) else []

@@ -71,7 +71,9 @@ def _listed(document: Document, node: dict[str, Any], number: int) -> list[int]:
     """Numbers of a node's children."""
     children = node.get("children", [])
     if not isinstance(children, list):
-        raise document.fail(f"nodes[{number}].children", f"a list was expected, {shown(children)}")
+        raise document.fail(
+            f"nodes[{number}].children", f"a list was expected, found {shown(children)}"
+        )
     for child in children:
         document.item("nodes", child, f"nodes[{number}].children")
     return children
