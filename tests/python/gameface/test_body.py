@@ -6,7 +6,7 @@ packaging/ship/gameface.sh tries three-vrm and the VRM reader of Blender."""
 import numpy as np
 import pytest
 import risorius
-from body_maker import PIXEL, BodyFile
+from body_maker import PIXEL, TURN, BodyFile
 from gltf_oracle import GlbFile
 from risorius.cli import main
 from risorius.gameface.avatar.humanoid import NEEDED
@@ -96,6 +96,27 @@ def test_a_head_bone_turns_the_face_and_all_that_hangs_on_it(face, tmp_path):  #
     assert np.abs(found.positions("Torso", world=moved) - found.positions("Torso")).max() == 0
 
 
+def test_targets_of_a_body_are_turned_with_its_mesh(face, tmp_path):  # noqa: F811
+    for version, turn in (("1.0", np.ones(3)), ("0.x", FLIP)):
+        found = hung(face, tmp_path, BodyFile(), version=version)
+        moved = found.positions("BodyHead", {"jawOpen": 1.0}) - found.positions("BodyHead")
+        assert np.abs(moved - (2 * TURN.T @ [0, 0.01, 0]) * turn).max() < 1e-6
+
+
+def test_a_mirrored_body_shows_its_outside(face, tmp_path):  # noqa: F811
+    body = BodyFile()
+    hat = next(row for row in body.json["nodes"] if row["name"] == "Hat")
+    ways = []
+    for hat["scale"] in ([1, 1, 1], [-1, 1, 1]):
+        found = hung(face, tmp_path, body)
+        [primitive] = found.meshes()["Hat"][1]["primitives"]
+        corners = found.positions("Hat")
+        if "indices" in primitive:
+            corners = corners[found.numbers(primitive["indices"])[:, 0].astype(int)]
+        ways.append(np.cross(corners[1] - corners[0], corners[2] - corners[0])[1:])
+    assert np.abs(ways[0] - ways[1]).max() < 1e-6  # mirrored in x, and turned over
+
+
 def test_a_body_keeps_its_materials_and_pictures(face, tmp_path):  # noqa: F811
     found = hung(face, tmp_path, BodyFile())
     names = [row["name"] for row in found.json["materials"]]
@@ -170,7 +191,13 @@ def test_eyes_meet_the_bodys_eye_bones(face, tmp_path):  # noqa: F811
     bones = found.json["extensions"]["VRMC_vrm"]["humanoid"]["humanBones"]
     mine = [world[bones[f"{side}Eye"]["node"]][:3, 3] for side in ("left", "right")]
     assert found.json["nodes"][bones["leftEye"]["node"]]["name"] == "LeftEye"
-    assert np.abs(np.mean(mine, axis=0)[:2] - [0, 1.68]).max() < 1e-6
+    middle, head = np.mean(mine, axis=0), world[node(found, "Head")][:3, 3]
+    assert np.abs(middle[:2] - [0, 1.68]).max() < 1e-6
+    is_deep = abs(middle[2] - head[2] - (0.1 - 0.02)) > 0.03
+    assert abs((head[2] - 0.02) if is_deep else (middle[2] - 0.1)) < 1e-6
+    old = hung(tmp_path / "eyes.dna", tmp_path, BodyFile(eyes=True), version="0.x")
+    offset = old.json["extensions"]["VRM"]["firstPerson"]["firstPersonBoneOffset"]
+    assert abs(offset["z"] - (middle[2] - 0.02)) < 1e-6  # to the front, as Unity has it
 
 
 def test_a_packed_body_is_unpacked(face, tmp_path):  # noqa: F811

@@ -9,6 +9,7 @@ import risorius
 from body_maker import BodyFile
 from gltf_oracle import GlbFile
 from risorius.cli import main
+from risorius.gameface.avatar.springs import Collider, Spring, Springs, table_0
 from test_avatar import LICENCE, face, toml_of  # noqa: F401  # a fixture
 
 LENGTH = 0.18  # metres
@@ -121,6 +122,12 @@ def test_vrm_0_lists_the_first_bones_of_chains(haired, tmp_path):
     x, y, z = sphere["shape"]["sphere"]["offset"]
     # The file looks back, so x and z are turned, and Unity's z is against glTF's.
     assert np.abs([ball["offset"][k] for k in "xyz"] - np.array([-x, y, z])).max() < 1e-6
+
+
+def test_vrm_0_has_unitys_z_and_no_capsules():
+    ball = Collider(3, [1.0, 2.0, 3.0], 0.1, [1.0, 2.0, 5.0])
+    [group] = table_0(Springs([Spring("a", [1, 2], [0])], [ball]))["colliderGroups"]
+    assert [row["offset"]["z"] for row in group["colliders"]] == [-3, -4, -5]
 
 
 def test_short_hair_and_lashes_stay_rigid(haired, tmp_path):
