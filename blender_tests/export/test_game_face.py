@@ -57,3 +57,20 @@ def test_a_vrm_asks_for_its_licence_and_for_a_body(dna_file, tmp_path):
     assert table["meta"]["authors"] == ["A", "B"]
     assert table["meta"]["allowRedistribution"] is True
     assert "hips" in table["humanoid"]["humanBones"]
+
+
+def test_a_face_is_hung_on_a_body_of_a_file(dna_file, tmp_path):
+    scene.load(dna_file)
+    body, path = tmp_path / "body.glb", tmp_path / "face.glb"
+    wished = {"shapes": {"arkit"}, "lod": 1}
+    made = {"filepath": str(body), "body": "mixamo", **wished}
+    assert bpy.ops.risorius.export_game_face(**made) == {"FINISHED"}
+    own = [mesh["name"] for mesh in _table(body)["meshes"]]
+    hung = {"filepath": str(path), "body_file": str(body), **wished}
+    with pytest.raises(RuntimeError, match="--without Nose: a mesh of the body was expected"):
+        bpy.ops.risorius.export_game_face(**hung, without="Nose")
+    assert not path.exists()
+    assert bpy.ops.risorius.export_game_face(**hung, without=f"{own[0]}, Soles, ") == {"FINISHED"}
+    names = [node["name"] for node in _table(path)["nodes"]]
+    assert "LeftForeArm" in names
+    assert len(_table(path)["meshes"]) == len(own) - 1

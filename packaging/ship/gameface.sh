@@ -40,11 +40,13 @@ works "game face in three-vrm" vrm "$python" "$here/check_vrm.py" "$out" "$face"
 cat "$logs/vrm.log"
 works "game face in TalkingHead" talk "$python" "$here/check_talk.py" "$out" "$face" "$@"
 cat "$logs/talk.log"
+works "game face on a body, in three-vrm" body "$python" "$here/check_body.py" "$out" "$face"
+cat "$logs/body.log"
 step "VRM in Blender"
 if "$python" -c "import bpy, os; os._exit(0)" 2>/dev/null; then
   "$python" -m pip install -q --no-deps --target "$out/reader" "$reader" >"$logs/reader.log" 2>&1
   works "game face, VRM in Blender" blender "$python" "$here/in_blender.py" "$out/reader" \
-    "$out/new.vrm" "$out/old.vrm"
+    "$out/new.vrm" "$out/old.vrm" "$out/body_new.vrm" "$out/body_old.vrm"
   grep "expressions" "$logs/blender.log"
 else
   echo "NOT RUN: no bpy"

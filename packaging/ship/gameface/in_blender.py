@@ -37,8 +37,15 @@ def try_file(path: Path) -> None:
         bones, expressions, name = try_new(read.vrm1, own["VRMC_vrm"])
     else:
         bones, expressions, name = try_old(read.vrm0, own["VRM"])
+    chains = [
+        len(one.get("joints", ())) for one in own.get("VRMC_springBone", {}).get("springs", ())
+    ]
+    if chains:
+        assert [len(one.joints) for one in read.spring_bone1.springs] == chains
+    chains += [0] * len(own.get("VRM", {}).get("secondaryAnimation", {}).get("boneGroups", ()))
     worst = max(moved(found, mesh) for mesh in found.meshes())
-    print(f"{path.name}: {name}, {bones} bones, {expressions} expressions, {worst:.4f} mm")
+    print(f"{path.name}: {name}, {bones} bones, {expressions} expressions, "
+          f"{len(chains)} springs, {worst:.4f} mm")  # fmt: skip
     if worst > CLIENT_MM:
         raise RuntimeError(f"{path}: at most {CLIENT_MM} mm were expected")
 

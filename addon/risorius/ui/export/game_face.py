@@ -62,6 +62,20 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
             ("mixamo", "Mixamo", "All bones by Mixamo's names, as TalkingHead wants them"),
         ),
     )
+    body_file: bpy.props.StringProperty(
+        name="Body File",
+        description=(
+            "A character in glTF or VRM with a skeleton, which the face is hung on; empty: none"
+        ),
+        subtype="FILE_PATH",
+    )
+    without: bpy.props.StringProperty(
+        name="Leave Out",
+        description="Meshes of the body, such as its head, separated by commas",
+    )
+    use_springs: bpy.props.BoolProperty(
+        name="Springs", description="Long hair of a VRM swings", default=True
+    )
     use_quantize: bpy.props.BoolProperty(
         name="Quantize", description="Store vertices with 16 bits; most programs read this"
     )
@@ -93,10 +107,12 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
         column = layout.column(heading="Shapes")
         column.use_property_split = False
         column.prop(self, "shapes")
-        for name in ("lod", "megabytes", "body", "vrm"):
+        made_up = ("without",) if self.body_file else ("body",)
+        for name in ("lod", "megabytes", "body_file", *made_up, "vrm"):
             layout.prop(self, name)
         if self.vrm != "NONE":
             self.draw_licence(layout)
+            layout.prop(self, "use_springs")
         for name in ("use_skeleton", "use_quantize", "use_meshopt", "use_combinations"):
             layout.prop(self, name)
 
@@ -120,9 +136,12 @@ class RISORIUS_OT_export_game_face(LicenceForm, FaceOperator, ExportHelper, Oper
                 meshopt=self.use_meshopt,
                 mb=self.megabytes or None,
                 within=0.5 if self.use_combinations else None,
-                humanoid="" if self.body == "NONE" else self.body,
+                humanoid="" if self.body == "NONE" or self.body_file else self.body,
                 vrm="" if self.vrm == "NONE" else self.vrm,
                 licence={} if self.vrm == "NONE" else self.licence(),
+                body=Path(system_path(self.body_file)) if self.body_file else None,
+                without=[name.strip() for name in self.without.split(",") if name.strip()],
+                springs=self.use_springs,
             )
             made = gameface.export(dna, native.module().Rig(dna), source, out.name, wishes)
             fileio.write_all({out.with_name(name): data for name, data in made.files.items()})

@@ -13,21 +13,27 @@ import numpy as np
 import numpy.typing as npt
 
 from .._native import Dna, Rig
+from ..author.geometry.simplify import fan_triangles
 from ..base.words import counted, joined
+from ..web.textures import base_name
 from . import faces
 from .avatar import licence
 from .avatar.vrm import Manner
+from .body.reading import Body, read_body
 from .combining import Combination, Sums, chosen, driver_table
 from .errors import GameFaceError
+from .joints.hair import Chains, Hair, add_chains, is_long
+from .joints.hanging import hung
+from .joints.skeleton import Skeleton, facing_back, find_skeleton
 from .manner import measured
 from .materials import Materials
 from .parts import Points, axes_of
 from .refining import POSES, Refiner
-from .skeleton import Skeleton, facing_back, find_skeleton
 from .targets import Target, find_targets
 from .wishes import Wishes
 from .writing import Change, Written, write
 
+Doubles = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
 _SMALL = 256  # pixels per side: smaller textures are more visible than quantized vertices
@@ -98,7 +104,7 @@ def _as_avatar(wishes: Wishes, out: str) -> Wishes:
     Raises:
         GameFaceError: a VRM without a complete licence.
     """
-    if not (wishes.vrm or wishes.humanoid):
+    if not (wishes.vrm or wishes.humanoid or wishes.body):
         return wishes
     if wishes.vrm:
         licence.checked(wishes.licence, wishes.vrm, out)
@@ -178,6 +184,7 @@ class _Maker:
         self._dna, self._rig, self._targets = dna, rig, targets
         self._materials = Materials(dna, file)
         self._file = file
+        self._body: Body | None = None
         self._lod = -1
         self._wishes = Wishes()
         self.notes: list[str] = []
@@ -196,20 +203,29 @@ class _Maker:
             delta = deltas[one.name] if one.name in deltas else self._sums.combination(one)
             changes.append(Change(one.name, "combinations", delta))
         written = write(
-            self._points, self._skeleton, self._materials, changes, wishes, self._manner
-        )
+            self._points, self._skeleton, self._materials, changes, wishes, self._manner,
+            self._body, self._chains,
+        )  # fmt: skip
         self.notes = self._combined + list(dict.fromkeys(self._materials.notes))
+        self.notes += self._body.notes if self._body else []
         return written
 
     def _take_level(self, wishes: Wishes) -> None:
         self._lod = wishes.lod
-        self._skeleton = self._find_skeleton(wishes)
+        self._skeleton, move = self._find_skeleton(wishes)
         axes = axes_of(self._dna, faces_back=wishes.vrm == "0.x")
-        self._points = Points(self._dna, self._rig, wishes.lod, self._skeleton, axes)
+        self._points = Points(self._dna, self._rig, wishes.lod, self._skeleton, axes, move)
+        if self._body is not None:
+            out = set(self._body.others)
+            parts = self._points.parts
+            self._points.parts = [p for p in parts if not {base_name(p.mesh), p.mesh} & out]
         if not self._points.parts:
             raise GameFaceError(
                 f"{self._file}: meshes at LOD {wishes.lod} were expected, there are none"
             )
+        self._chains = Chains()
+        if wishes.vrm and wishes.springs:
+            self._add_chains()
         self._sums = Sums(self._points, self._rig, self._targets)
         presets = {t.name: t for t in self._targets if t.group == "vrm"}
         self._manner = measured(self._points, self._sums, presets) if wishes.vrm else Manner()
@@ -242,15 +258,47 @@ class _Maker:
         self._refined = self._refiner.found(poses, room)
         self.made = self.made + [one for one, _ in self._refined]
 
-    def _find_skeleton(self, wishes: Wishes) -> Skeleton:
+    def _add_chains(self) -> None:
+        """Joints in hair that is long at the finest level, as coarse levels join cards."""
+        parts, long = self._points.parts, list[int]()
+        up = axes_of(self._dna)
+        for number, part in enumerate(parts):
+            if part.kind == "hair":
+                names = [base_name(name) for name in self._dna.mesh_names]
+                finest = self._dna.meshes[names.index(base_name(part.mesh))]
+                triangles = finest.layout_positions.astype(np.int64)[fan_triangles(finest)]
+                if is_long(finest.positions.astype(np.float64) @ up.T, triangles):
+                    long.append(number)
+        hairs = [
+            Hair(self._points.rest[p.rows], p.rows, p.triangles, p.joints, p.weights)
+            for p in (parts[number] for number in long)
+        ]
+        self._skeleton, self._chains, made = add_chains(self._skeleton, hairs)
+        for number, hair in zip(long, made, strict=True):
+            parts[number] = replace(parts[number], joints=hair.joints, weights=hair.weights)
+
+    def _find_skeleton(self, wishes: Wishes) -> tuple[Skeleton, Doubles]:
+        """The joints, and metres that the face moves to its body."""
+        move = np.zeros(3)
+        if wishes.body and self._body is None:
+            names = {*self._dna.mesh_names, *map(base_name, self._dna.mesh_names)}
+            self._body = read_body(
+                wishes.body, scale=wishes.body_scale, without=wishes.without, faces=names,
+                needs_all=bool(wishes.vrm),
+            )  # fmt: skip
         try:
             found = find_skeleton(
-                self._dna, axes_of(self._dna), kind=wishes.humanoid, is_body=bool(wishes.vrm),
+                self._dna, axes_of(self._dna), kind=wishes.humanoid,
+                is_body=bool(wishes.vrm) and self._body is None,
                 is_turned=wishes.humanoid == "mixamo" and wishes.vrm != "0.x",
             )  # fmt: skip
+            if self._body is not None:
+                found, move = hung(found, self._body)
         except GameFaceError as error:
             raise GameFaceError(f"{self._file}: {error}") from None
-        return facing_back(found) if wishes.vrm == "0.x" else found
+        if wishes.vrm == "0.x":
+            return facing_back(found), move * [-1.0, 1.0, -1.0]
+        return found, move
 
     def lines(self, written: Written) -> list[str]:
         """One line per group: numbers of targets and vertices, bytes, deviation of linear sums."""

@@ -22,17 +22,17 @@ _VERTICES, _CORNERS = 34962, 34963
 
 
 class Glb:
-    """The JSON table and the binary buffer of a GLB file under construction.
-
-    Attributes:
-        table: the JSON; callers append nodes and meshes to its lists.
-        packs: whether vertices and triangles are packed with meshoptimizer.
-        sparse: whether an accessor of mostly zero rows stores only its other rows.
+    """Attributes:
+    table: the JSON; whoever writes nodes and meshes adds to its lists.
+    pictures: name of a picture of the face -> its texture.
+    packs: lists of vertices and corners are packed by meshoptimizer.
+    sparse: lists that hold zeros for the most part are kept by their other rows.
     """
 
     def __init__(self, *, packs: bool = False, sparse: bool = False) -> None:
         self.packs, self.sparse = packs, sparse
         self.table: dict[str, Any] = {"accessors": [], "bufferViews": []}
+        self.pictures: dict[str, int] = {}
         self._binary = bytearray()
         # bytes of buffer 1, which is not stored: packed views declare their unpacked size in it
         self._unpacked = 0
@@ -83,6 +83,11 @@ class Glb:
         else:
             view = self.view(flat.tobytes(), target=_CORNERS)
         return self._accessor({**about, "bufferView": view})
+
+    def plain(self, values: Numbers) -> int:
+        """An accessor of bytes as they are. Args: values: [n, k], as of vertices."""
+        about = self._about(values, False, False)
+        return self._accessor({**about, "bufferView": self.view(values.tobytes())})
 
     def matrices(self, values: Numbers) -> int:
         """Adds an accessor of matrices. Args: values: float[n, 4, 4], row-major."""

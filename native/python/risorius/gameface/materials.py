@@ -32,7 +32,8 @@ _PLAIN = {
     "wet": ((1.0, 1.0, 1.0), 0.05),
 }  # fmt: skip
 _WET = 0.06  # opacity of tears and corneas
-_CUT = 0.35  # opacity below which hair is cut away
+_SMOOTH = {"magFilter": 9729, "minFilter": 9987}  # a sampler
+_CUT = 0.35  # opacity below which hair is not there
 
 
 class Materials:
@@ -116,13 +117,15 @@ class Materials:
         media, data = found
         label = f"{Path(name).stem}_{role}"
         images, textures = glb.table.setdefault("images", []), glb.table.setdefault("textures", [])
-        for number, texture in enumerate(textures):
-            if images[texture["source"]]["name"] == label:
-                return number
-        images.append({"name": label, "mimeType": media, "bufferView": glb.view(data)})
-        glb.table.setdefault("samplers", [{"magFilter": 9729, "minFilter": 9987}])
-        textures.append({"source": len(images) - 1, "sampler": 0})
-        return len(textures) - 1
+        if label not in glb.pictures:
+            images.append({"name": label, "mimeType": media, "bufferView": glb.view(data)})
+            samplers = glb.table.setdefault("samplers", [])
+            if _SMOOTH not in samplers:  # those of a body are others
+                samplers.append(_SMOOTH)
+            number = samplers.index(_SMOOTH)
+            textures.append({"source": len(images) - 1, "sampler": number})
+            glb.pictures[label] = len(textures) - 1
+        return glb.pictures[label]
 
     def _made(self, name: str, role: str, longest: int, alpha: str) -> tuple[str, bytes] | None:
         """Media type and bytes of a picture file, scaled and recompressed; None if unusable."""

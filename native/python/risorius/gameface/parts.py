@@ -14,8 +14,9 @@ from ..author.geometry.skeleton import skin_entries
 from ..solving.surface import Surface
 from ..web.kinds import kind_of
 from .errors import GameFaceError
+from .joints.skeleton import Skeleton
+from .joints.weights import INFLUENCES, strongest
 from .naming import safe
-from .skeleton import Skeleton
 
 Doubles = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -25,8 +26,7 @@ _AXES = {
     "back": (0, 0, -1),
 }  # fmt: skip
 _METRES = {"cm": 0.01, "m": 1.0}
-_FARTHEST = 1e4  # metres: a vertex farther away is an error
-INFLUENCES = 4  # largest number of joints per vertex, which every client supports
+_FARTHEST = 1e4  # metres
 
 
 @dataclass(frozen=True)
@@ -65,15 +65,19 @@ class Points:
         axes: float64[3, 3], maps the file's axes and unit to glTF's metres.
     """
 
-    def __init__(self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles) -> None:
-        """Prepares the vertices of a LOD.
+    def __init__(
+        self, dna: Dna, rig: Rig, lod: int, skeleton: Skeleton, axes: Doubles,
+        move: Doubles | None = None,
+    ) -> None:  # fmt: skip
+        """Of a level.
 
         Args:
-            dna: face with geometry.
-            rig: compiled from it.
-            lod: number of the LOD.
-            skeleton: joints of the exported file.
-            axes: from axes_of.
+            dna: with geometry.
+            rig: of it.
+            lod: of the file.
+            skeleton: of its joints.
+            axes: as axes_of gives them.
+            move: float64[3], metres that the face moves to the body that it hangs on.
         """
         surface = Surface(dna, rig, lod)
         meshes = [m for m in surface.mesh_indices if len(dna.meshes[m].positions)]
@@ -83,7 +87,7 @@ class Points:
         points = np.stack([mesh, vertex], axis=1)
         self._probe = surface.probe(points)
         self._face = dna.name or "the face"
-        self.axes = axes
+        self.axes, self._move = axes, np.zeros(3) if move is None else move
         self.rest = self.at(np.asarray(rig.initial_raw_controls, np.float32))
         starts = np.concatenate([[0], np.cumsum(counts)])
         made = [
@@ -101,7 +105,7 @@ class Points:
         Raises:
             GameFaceError: a position is not finite or farther than 10 km.
         """
-        found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T
+        found = np.asarray(self._probe.positions(raw), np.float64) @ self.axes.T + self._move
         if not (np.abs(found) < _FARTHEST).all():
             raise GameFaceError(
                 f"{self._face}: vertices nearer than 10 km were expected, "
@@ -197,9 +201,4 @@ def _skin(mesh: Mesh, skeleton: Skeleton) -> tuple[Ints, Doubles]:
     vertex, joint, weight = skin_entries(mesh)
     np.add.at(dense, (vertex, skeleton.of_joint[joint]), weight)
     dense[dense.sum(axis=1) <= 0, skeleton.head] = 1.0
-    joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
-    weights = np.take_along_axis(dense, joints, axis=1)
-    steps = np.rint(255 * weights / weights.sum(axis=1, keepdims=True))
-    steps[:, 0] += 255 - steps.sum(axis=1)  # the strongest joint absorbs the rounding error
-    joints[steps <= 0] = 0
-    return joints, steps / 255
+    return strongest(dense)

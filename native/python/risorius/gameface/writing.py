@@ -10,12 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .avatar import vrm
+from .avatar import springs, vrm
+from .body.reading import Body
+from .body.writing import Put, frames, put_meshes
 from .glb import QUANTIZED, Glb
+from .joints.hair import Chains
+from .joints.nodes import add_nodes, node_of
+from .joints.skeleton import Skeleton
+from .joints.weights import INFLUENCES
 from .materials import Materials
 from .naming import unlike
-from .parts import INFLUENCES, Part, Points, normals_of
-from .skeleton import Skeleton
+from .parts import Part, Points, normals_of
 from .wishes import Wishes
 
 Doubles = npt.NDArray[np.float64]
@@ -55,19 +60,24 @@ def write(
     changes: Sequence[Change],
     wishes: Wishes,
     manner: vrm.Manner,
+    body: Body | None = None,
+    chains: Chains | None = None,
 ) -> Written:
     """Writes the glTF file.
 
     Args:
-        points: vertices of the LOD.
-        skeleton: joints of the face, written if wishes.skeleton is set.
-        materials: materials of the face.
-        changes: morph targets in the order of the file.
-        wishes: export options.
-        manner: measured VRM values of the face.
+        points: of the level.
+        skeleton: of the face, written where wished.
+        materials: of the face.
+        changes: the targets in the order in which meshes have them.
+        wishes: how lists are kept.
+        manner: of the face, for a VRM.
+        body: that the skeleton hangs on; None: the face alone.
+        chains: joints of the skeleton that swing.
     """
     farthest = max((float(np.abs(c.delta).max(initial=0.0)) for c in changes), default=0.0)
     writer = _Writer(points, skeleton, materials, wishes, farthest)
+    writer.body, writer.chains = body, chains or Chains()
     return writer.file(changes, manner)
 
 
@@ -78,6 +88,9 @@ class _Writer:
     ) -> None:  # fmt: skip
         self.points, self.skeleton, self.materials = points, skeleton, materials
         self.wishes = wishes
+        self.body: Body | None = None
+        self.chains = Chains()
+        self.node_of = list(range(len(skeleton.names)))
         self.glb = Glb(packs=wishes.meshopt, sparse=wishes.sparse)
         self.step, self.middle = 1.0, np.zeros(3)
         if wishes.quantize:
@@ -93,8 +106,8 @@ class _Writer:
     def file(self, changes: Sequence[Change], manner: vrm.Manner) -> Written:
         table = self.glb.table
         nodes = table.setdefault("nodes", [])
-        roots = [self._joints(nodes)] if self.wishes.skeleton else []
-        # TalkingHead looks for meshes below the armature, other clients at the root of the scene.
+        roots = self._joints(nodes) if self.wishes.skeleton else []
+        # TalkingHead looks for meshes below the armature; elsewhere nothing stands above a skin.
         below = nodes[0].setdefault("children", []) if self.wishes.humanoid == "mixamo" else roots
         shown = list[vrm.Shown]()
         whole = max(self.points.parts, key=lambda p: (p.kind == "skin", len(p.rows)))
@@ -114,9 +127,11 @@ class _Writer:
             nodes.append(node)
         if self.wishes.humanoid == "mixamo":
             self._add_soles(below)
+        put = self._put_body(roots, names)
+        shown += put.meshes
         table.update(scene=0, scenes=[{"name": "Face", "nodes": roots}])
         if self.wishes.vrm:
-            self._make_vrm(shown, changes, manner)
+            self._make_vrm(shown, changes, manner, put)
         groups = {
             group: (len(self.names[group]), int(self.moved[group].sum()), size)
             for group, size in self.bytes.items()
@@ -124,22 +139,46 @@ class _Writer:
         return Written(self.glb.data(), groups)
 
     def _make_vrm(
-        self, shown: Sequence[vrm.Shown], changes: Sequence[Change], manner: vrm.Manner
-    ) -> None:
+        self, shown: Sequence[vrm.Shown], changes: Sequence[Change], manner: vrm.Manner,
+        put: Put,
+    ) -> None:  # fmt: skip
         own, table = self.skeleton, self.glb.table
         head, eyes = own.places[own.head], [own.bones.get(f"{s}Eye") for s in ("left", "right")]
         known = [own.places[eye] for eye in eyes if eye is not None]
+        bones = {name: self.node_of[joint] for name, joint in own.bones.items()}
+        if self.body:  # the body's neck and head move those of the face
+            moved = {name: bones[name] for name in bones if name not in ("neck", "head")}
+            bones = {**self.body.bones, **moved}
+            head = frames(self.body, self.wishes.vrm)[0][self.body.bones["head"]]
         avatar = vrm.Avatar(
-            own.bones,  # the nodes of the joints come first, so node numbers equal joint numbers
+            bones,
             (np.mean(known, axis=0) - head).tolist() if known else [0.0, 0.0, 0.0],
             shown,
             [c.name for c in changes if c.group not in ("vrm", "combinations")],
             self.wishes.licence,
             manner,
+            put.plain,
+            self._springs().joined(put.springs),
         )
         name, made = vrm.extension(self.wishes.vrm, avatar, table.get("materials", []))
         table.setdefault("extensions", {})[name] = made
         self.glb.uses(name, required=False)
+        if self.wishes.vrm == "1.0" and avatar.springs.springs:
+            table["extensions"][springs.EXTENSION] = springs.table_1(avatar.springs)
+            self.glb.uses(springs.EXTENSION, required=False)
+
+    def _springs(self) -> springs.Springs:
+        """Chains of long hair."""
+        own, chains = self.skeleton, self.chains
+        if not chains.joints:
+            return springs.Springs()
+        offset = own.turns[own.head].T @ (chains.centre - own.places[own.head])
+        ball = springs.Collider(self.node_of[own.head], offset.tolist(), chains.radius)
+        rows = [
+            springs.Spring(f"Hair{i}", [self.node_of[j] for j in chain], [0], chains.hit)
+            for i, chain in enumerate(chains.joints, 1)
+        ]
+        return springs.Springs(rows, [ball])
 
     def _add_soles(self, below: list[int]) -> None:
         """Adds two triangles of 1 mm at the toes of a body without meshes: TalkingHead lowers an
@@ -174,32 +213,43 @@ class _Writer:
         on = is_head[part.joints][part.weights > 0]
         return "thirdPersonOnly" if on.all() else "auto" if on.any() else "both"
 
-    def _joints(self, nodes: list[dict[str, Any]]) -> int:
-        """Adds the nodes and the skin of the joints, and returns the number of the root's node."""
-        own, first = self.skeleton, len(nodes)
-        for i, name in enumerate(own.names):
-            parent = own.parents[i]
-            above = own.places[parent] if parent >= 0 else np.zeros(3)
-            turn = own.turns[parent] if parent >= 0 else np.eye(3)
-            place = turn.T @ (own.places[i] - above)
-            node: dict[str, Any] = {"name": name, "translation": place.tolist()}
-            quaternion = _quaternion(turn.T @ own.turns[i])
-            if quaternion != [0, 0, 0, 1]:
-                node["rotation"] = quaternion
-            below = [first + j for j, parent in enumerate(own.parents) if parent == i]
-            if below:
-                node["children"] = below
-            nodes.append(node)
+    def _joints(self, nodes: list[dict[str, Any]]) -> list[int]:
+        """The numbers of the nodes that stand above no other."""
+        own, body = self.skeleton, self.body
+        roots = [0]
+        if body:
+            places, turns = frames(body, self.wishes.vrm)
+            add_nodes(nodes, body.names, body.parents, places, turns)
+            roots = [i for i, parent in enumerate(body.parents) if parent < 0]
+            self.node_of = [own.hooks[0], *range(len(nodes), len(nodes) + len(own.names) - 1)]
+        taken = {node["name"].lower() for node in nodes}
+        for i in range(bool(body), len(own.names)):
+            if i in own.hooks and body:
+                above, place, turn = own.hooks[i], places[own.hooks[i]], turns[own.hooks[i]]
+            elif own.parents[i] >= 0:
+                parent = own.parents[i]
+                above, place, turn = self.node_of[parent], own.places[parent], own.turns[parent]
+            else:
+                above, place, turn = -1, np.zeros(3), np.eye(3)
+            name = unlike(own.names[i], taken)
+            nodes.append(node_of(name, own.places[i] - place, own.turns[i], turn))
+            if above >= 0:
+                nodes[above].setdefault("children", []).append(self.node_of[i])
         inverse = np.tile(np.eye(4), (len(own.names), 1, 1))
         back = np.swapaxes(own.turns, 1, 2)
         # glTF ignores the node of a skinned mesh, so the scale is here
         inverse[:, :3, :3] = back * self.step
         inverse[:, :3, 3] = np.einsum("jab,jb->ja", back, self.middle - own.places)
-        joints = [first + i for i in range(len(own.names))]
-        self.glb.table["skins"] = [
-            {"joints": joints, "skeleton": first, "inverseBindMatrices": self.glb.matrices(inverse)}
-        ]
-        return first
+        skin = {"joints": self.node_of, "inverseBindMatrices": self.glb.matrices(inverse)}
+        self.glb.table["skins"] = [skin if body else {**skin, "skeleton": 0}]
+        return roots
+
+    def _put_body(self, roots: list[int], names: set[str]) -> Put:
+        """The meshes of the body beside those of the face."""
+        if not self.body:
+            return Put()
+        called = [unlike(mesh.name, names) for mesh in self.body.meshes]
+        return put_meshes(self.body, self.glb, called, self.wishes.vrm, roots)
 
     def _mesh(self, part: Part, changes: Sequence[Change], whole: bool) -> dict[str, Any]:
         glb, rest = self.glb, self.points.rest[part.rows]
@@ -274,20 +324,3 @@ class _Writer:
         if not self.wishes.quantize:
             return self.glb.vertices(np.ascontiguousarray(values, "<f4"))
         return self.glb.vertices(np.rint(values * 255).astype("u1"), normalized=True)
-
-
-def _quaternion(turn: Doubles) -> list[float]:
-    """A rotation matrix as a quaternion x, y, z, w."""
-    x, y, z = np.diag(turn)
-    squares = np.array([1 + x - y - z, 1 - x + y - z, 1 - x - y + z, 1 + x + y + z])
-    # the other components are divided by it, so it must not be near 0
-    largest = int(squares.argmax())
-    m = turn
-    rows = (
-        (squares[0], m[0, 1] + m[1, 0], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]),
-        (m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]),
-        (m[2, 0] + m[0, 2], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]),
-        (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]),
-    )
-    row = np.array(rows[largest]) / (2 * np.sqrt(squares[largest]))
-    return [float(v) + 0.0 for v in row / np.linalg.norm(row)]

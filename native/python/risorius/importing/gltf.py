@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..base.budget import Budget
-from ..base.given import GivenError, shown, whole
+from ..base.given import GivenError, finite, several, shown, whole
 from . import named_json
 from .errors import AnimationFileError
 from .keys import CONSTANT, CUBIC, LINEAR, Keys, on_one_clock
@@ -299,8 +299,21 @@ class Document:
             if index or self._binary is None:
                 raise self.fail(place, "a uri was expected")
             return self._binary
+        return self.linked(uri, place)
+
+    def linked(self, uri: object, place: str) -> bytes:
+        """The bytes that a uri stands for: its own in base64, or a file in the glTF's folder.
+
+        Args:
+            uri: of a buffer or a picture, as in the file; may be of any type.
+            place: place of the uri, for errors.
+
+        Raises:
+            AnimationFileError: not a uri, not base64, a file elsewhere, or one that is missing.
+            BudgetError: more bytes than a file of this size may hold.
+        """
         if not isinstance(uri, str):
-            raise self.fail(place, f"a uri was expected, found {uri!r}")
+            raise self.fail(place, f"a uri was expected, found {shown(uri)}")
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
@@ -314,6 +327,55 @@ class Document:
         # A short JSON may refer to a large buffer many times, so each buffer counts.
         self.budget.hold(len(data), place)
         return data
+
+    def finite(
+        self, table: Mapping[str, Any], key: str, default: Sequence[float], place: str
+    ) -> Doubles:
+        """float64[n], a list of finite numbers in a table of the JSON.
+
+        Args:
+            table: the table.
+            key: the key of the list.
+            default: the list if the key is missing; n is its length.
+            place: the table's name in errors.
+
+        Raises:
+            AnimationFileError: another value, or another length.
+        """
+        value = table.get(key, list(default))
+        try:
+            found = several(value, finite)
+        except GivenError:
+            found = ()
+        if len(found) != len(default):
+            raise self.fail(
+                f"{place}.{key}",
+                f"{len(default)} finite numbers were expected, found {shown(value)}",
+            )
+        return np.array(found, np.float64)
+
+    def transform(self, node: Mapping[str, Any], place: str) -> Doubles:
+        """float64[4, 4] from a node to the node above it.
+
+        Args:
+            node: its table.
+            place: its name in errors.
+
+        Raises:
+            AnimationFileError: its matrix, rotation, scale or translation is no list of numbers.
+        """
+        if "matrix" in node:
+            return self.finite(node, "matrix", [0.0] * 16, place).reshape(4, 4).T
+        x, y, z, w = self.finite(node, "rotation", [0.0, 0.0, 0.0, 1.0], place)
+        out = np.eye(4)
+        out[:3, :3] = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+        out[:3, :3] *= self.finite(node, "scale", [1.0, 1.0, 1.0], place)
+        out[:3, 3] = self.finite(node, "translation", [0.0, 0.0, 0.0], place)
+        return out
 
 
 def _is_key(value: object, table: Mapping[Any, object]) -> TypeGuard[Any]:

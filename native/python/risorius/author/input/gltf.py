@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base import signatures
 from ...base.budget import Budget
-from ...base.given import GivenError, finite, several, shown
+from ...base.given import GivenError, shown
 from ...importing import named_json
 from ...importing.gltf import FLOATS, INDICES, Document, is_glb, is_gltf, open_glb, open_gltf
 from ...importing.packed.draco import EXTENSION as DRACO
@@ -292,11 +292,11 @@ def _uvs(
     if len(found) != count:
         raise document.fail(f"primitives.attributes.{name}", f"{count} rows were expected")
     place = "KHR_texture_transform"
-    found = found * _numbers(document, change, "scale", [1.0, 1.0], place)
-    angle = _numbers(document, {"rotation": [change.get("rotation", 0)]}, "rotation", [0], place)
+    found = found * document.finite(change, "scale", [1.0, 1.0], place)
+    angle = document.finite({"rotation": [change.get("rotation", 0)]}, "rotation", [0], place)
     cos, sin = float(np.cos(angle[0])), float(np.sin(angle[0]))
     found = found @ np.array([[cos, -sin], [sin, cos]])
-    found = found + _numbers(document, change, "offset", [0.0, 0.0], place)
+    found = found + document.finite(change, "offset", [0.0, 0.0], place)
     if not np.abs(found).max(initial=0.0) <= _FURTHEST_UV:
         raise document.fail(
             f"primitives.attributes.{name}",
@@ -393,7 +393,7 @@ class _World:
         """float64[4, 4]: matrix from a node to the world."""
         out = np.eye(4)
         for number in self.above(node):
-            out = _local(self._document, self.rows[number], f"nodes[{number}]") @ out
+            out = self._document.transform(self.rows[number], f"nodes[{number}]") @ out
         return out
 
 
@@ -419,41 +419,3 @@ def _bound(document: Document, world: _World, index: object, place: str) -> Doub
             f"{at}.inverseBindMatrices", f"{len(joints)} were expected, found {len(rows)}"
         )
     return out @ rows[top].reshape(4, 4).T
-
-
-def _numbers(
-    document: Document, table: Mapping[str, Any], key: str, default: list[float], place: str
-) -> Doubles:
-    """The finite numbers of a table's entry; their number must be that of the default.
-
-    Raises:
-        AnimationFileError: the entry is invalid.
-    """
-    value = table.get(key, default)
-    try:
-        found = several(value, finite)
-    except GivenError:
-        found = ()
-    if len(found) != len(default):
-        raise document.fail(
-            f"{place}.{key}", f"{len(default)} finite numbers were expected, found {shown(value)}"
-        )
-    return np.array(found, np.float64)
-
-
-def _local(document: Document, node: Mapping[str, Any], place: str) -> Doubles:
-    def numbers(key: str, default: list[float]) -> Doubles:
-        return _numbers(document, node, key, default, place)
-
-    if "matrix" in node:
-        return numbers("matrix", [0.0] * 16).reshape(4, 4).T
-    x, y, z, w = numbers("rotation", [0.0, 0.0, 0.0, 1.0])
-    out = np.eye(4)
-    out[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    out[:3, :3] *= numbers("scale", [1.0, 1.0, 1.0])
-    out[:3, 3] = numbers("translation", [0.0, 0.0, 0.0])
-    return out

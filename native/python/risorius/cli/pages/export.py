@@ -11,6 +11,7 @@ import risorius
 from ...files import fileio
 from ...gameface import GROUPS, Wishes, export
 from ...gameface.avatar import humanoid, licence
+from ...gameface.body.reading import SUFFIXES
 from ...gameface.takes import frames_of
 from ..files import (
     CommandLineError,
@@ -93,6 +94,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--licence", type=Path, metavar="FILE.toml", help="the VRM's name, authors and permissions"
     )
+    parser.add_argument(
+        "--body", type=Path, metavar="BODY.glb",
+        help="hang the face on a character of your own: .glb, .gltf or .vrm with a skeleton",
+    )  # fmt: skip
+    parser.add_argument(
+        "--body-scale",
+        type=number(0, above=True),
+        metavar="N",
+        help="metres of a unit of the body; default: 0.01 if it is taller than 20, else 1",
+    )
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="MESH",
+        help="leave out a mesh of the body, or of the face such as shirt; repeatable",
+    )
+    parser.add_argument(
+        "--no-springs", action="store_true", help="long hair of a VRM does not swing"
+    )
     parser.set_defaults(func=run)
 
 
@@ -106,8 +127,7 @@ def run(args: argparse.Namespace) -> int:
         raise CommandLineError("--licence is of a VRM: add --vrm 1.0 or --vrm 0.x")
     if args.takes and args.within is None:
         raise CommandLineError("--takes is for combinations: add --within, such as --within 0.5")
-    if args.no_skeleton and (args.vrm or args.humanoid):
-        raise CommandLineError("--no-skeleton: a VRM, and a humanoid, have a skeleton")
+    _check_body(args, out)
     said = licence.read(args.licence, args.vrm) if args.licence else {}
     default = "vrm,arkit" if args.vrm else "arkit,visemes"
     shapes = tuple(dict.fromkeys((args.shapes or default).split(",")))
@@ -120,7 +140,8 @@ def run(args: argparse.Namespace) -> int:
     wishes = Wishes(
         shapes, args.lod, not args.no_skeleton, args.sparse, args.quantize, args.meshopt,
         args.normals, args.textures, args.mb, args.most, args.within, frames,
-        args.humanoid or "", args.vrm or "", said,
+        args.humanoid or "", args.vrm or "", said, args.body, args.body_scale,
+        tuple(args.without), not args.no_springs,
     )  # fmt: skip
     made = export(dna, rig, args.file, out.name, wishes)
     fileio.write_all({out.with_name(name): data for name, data in made.files.items()})
@@ -131,3 +152,17 @@ def run(args: argparse.Namespace) -> int:
     for line in made.groups:
         print(line)
     return 0
+
+
+def _check_body(args: argparse.Namespace, out: Path) -> None:
+    """Raises: CommandLineError: options of a skeleton that exclude each other."""
+    if args.no_skeleton and (args.vrm or args.humanoid or args.body):
+        raise CommandLineError("--no-skeleton: a VRM, a humanoid, and a body have a skeleton")
+    if args.body is None:
+        if args.without or args.body_scale is not None:
+            raise CommandLineError("--without and --body-scale are of a body: add --body BODY.glb")
+        return
+    if args.humanoid:
+        raise CommandLineError("--humanoid makes up a body: leave it or --body out")
+    require_suffix(args.body, SUFFIXES, "--body")
+    refuse_same_file(str(args.body), str(out))

@@ -31,12 +31,12 @@ _MIDDLE: Mapping[str, _Row] = {
     "spine": ("hips", "Spine", "spine spine01", True, (0, 0.66, 0), ""),
     "chest": ("spine", "Spine1", "chest spine1 spine02 spine03", False, (0, 0.74, 0), ""),
     "upperChest": ("chest", "Spine2", "upperchest spine2 spine04 spine05", False, (0, 0.83, 0), ""),
-    "neck": ("upperChest", "Neck", "", False, (0, 0.935, 0), ""),
-    "head": ("neck", "Head", "", True, (0, 1, 0), ""),
-    "jaw": ("head", "Jaw", "", False, (0, 1.015, 0.02), ""),
+    "neck": ("upperChest", "Neck", "neck neck01", False, (0, 0.935, 0), ""),
+    "head": ("neck", "Head", "head", True, (0, 1, 0), ""),
+    "jaw": ("head", "Jaw", "jaw", False, (0, 1.015, 0.02), ""),
 }  # fmt: skip
 _SIDED: Mapping[str, _Row] = {
-    "Eye": ("head", "Eye", "", False, (0.0185, 1.025, 0.05), ""),
+    "Eye": ("head", "Eye", "eye faceeye", False, (0.0185, 1.025, 0.05), ""),
     "Shoulder": ("upperChest", "Shoulder", "shoulder clavicle", False, (0.02, 0.90, 0), "arm"),
     "UpperArm": ("Shoulder", "Arm", "upperarm arm uparm", True, (0.11, 0.895, 0), "arm"),
     "LowerArm": ("UpperArm", "ForeArm", "lowerarm forearm", True, (0.275, 0.895, 0), "arm"),
@@ -125,8 +125,9 @@ def bone_of(joint: str) -> str:
 
 
 def _plain(joint: str) -> tuple[str, str]:
-    """A joint's name without separators and side, and its side."""
-    name = re.sub(r"^j_bip_(c_)?", "", re.sub(r"^.*:", "", joint.lower()))
+    """A joint's name without separators, and its side."""
+    # Loaders drop the colon of mixamorig:Hips.
+    name = re.sub(r"^(mixamorig\d*_?|j_(bip|adj)_(c_)?)", "", re.sub(r"^.*:", "", joint.lower()))
     for side in _SIDES:
         short = side[0]
         for pattern in (rf"^{side}", rf"{side}$", rf"^{short}[_.]", rf"[_.]{short}$"):
@@ -134,6 +135,14 @@ def _plain(joint: str) -> tuple[str, str]:
             if found:
                 return re.sub(r"[^a-z0-9]", "", plain), side
     return re.sub(r"[^a-z0-9]", "", name), ""
+
+
+def new_bone(name: str) -> str:
+    """The name of a bone in VRM 1.0. Args: name: in VRM 0.x, whose thumbs begin one part later."""
+    for old, new in (("ThumbProximal", "ThumbMetacarpal"), ("ThumbIntermediate", "ThumbProximal")):
+        if name.endswith(old):
+            return name.removesuffix(old) + new
+    return name
 
 
 def wanted(own: Iterable[str], kind: str) -> list[str]:

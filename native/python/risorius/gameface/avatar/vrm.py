@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from . import licence
+from .springs import Springs, table_0
 
 PRESETS = (
     "happy", "angry", "sad", "relaxed", "surprised", "neutral", "aa", "ih", "ou", "ee", "oh",
@@ -70,12 +71,14 @@ class Avatar:
     """Input of the VRM tables.
 
     Attributes:
-        bones: VRM name of a bone -> number of its node.
-        eyes: offset in metres from the head's joint to the midpoint of the eyes.
-        meshes: the meshes of the file.
-        own: names of targets that become custom expressions.
-        said: the licence fields.
-        manner: the measured values.
+        bones: VRM's name of a bone -> node.
+        eyes: metres from the head's joint to the middle of the eyes.
+        meshes: those of the file.
+        own: names of targets that are expressions by their own name.
+        said: the licence.
+        manner: what was measured.
+        plain: number of a material -> what VRM 0.x says of it, where a body has said so.
+        springs: chains that swing.
     """
 
     bones: Mapping[str, int]
@@ -84,6 +87,8 @@ class Avatar:
     own: Sequence[str]
     said: Mapping[str, Any]
     manner: Manner
+    plain: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
+    springs: Springs = field(default_factory=Springs)
 
     def binds(self, name: str) -> Iterator[tuple[Shown, int]]:
         """The meshes that have a target, and its index in each."""
@@ -151,9 +156,11 @@ def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, An
     groups = [_group(avatar, n, _OLD[n]) for n in _OLD if _is_there(avatar, n)]
     more = [n for n in ("surprised", *avatar.own) if n not in _OLD and _is_there(avatar, n)]
     groups += [_group(avatar, name, "unknown") for name in dict.fromkeys(more)]
+    eyes = avatar.eyes
     first: dict[str, Any] = {
         "firstPersonBone": avatar.bones["head"],
-        "firstPersonBoneOffset": dict(zip("xyz", avatar.eyes, strict=True)),
+        # Unity's z, which is against glTF's.
+        "firstPersonBoneOffset": {"x": eyes[0], "y": eyes[1], "z": -eyes[2]},
         "meshAnnotations": [
             {"mesh": s.mesh, "firstPersonFlag": _OLD_FIRST[s.first]} for s in avatar.meshes
         ],
@@ -173,8 +180,11 @@ def _old(avatar: Avatar, materials: Sequence[Mapping[str, Any]]) -> dict[str, An
         },
         "firstPerson": first,
         "blendShapeMaster": {"blendShapeGroups": groups},
-        "secondaryAnimation": {"boneGroups": [], "colliderGroups": []},
-        "materialProperties": [_plain(material["name"]) for material in materials],
+        "secondaryAnimation": table_0(avatar.springs),
+        "materialProperties": [
+            avatar.plain.get(number) or _plain(material["name"])
+            for number, material in enumerate(materials)
+        ],
     }
 
 

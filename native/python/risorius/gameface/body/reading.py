@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: MIT
+"""A character in glTF or VRM: skeleton, meshes and bones, upright, in metres, facing along z."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ...base.budget import Budget
+from ...base.words import joined
+from ...controls import arkit
+from ...importing import named_json
+from ...importing.gltf import Document, is_glb, open_glb, open_gltf
+from ...importing.source import decode, read_bytes, refuse_other_kinds
+from ..avatar import humanoid
+from ..avatar.vrm import PRESETS
+from ..errors import GameFaceError
+from .meshes import BodyMesh, Meshes
+from .tree import Tree, bones_of, find_tree
+
+Doubles = npt.NDArray[np.float64]
+
+SUFFIXES = (".glb", ".gltf", ".vrm")
+_TALLEST = 20.0  # units from feet to head: a taller body is in centimetres
+_HANGING = 25.0  # degrees below the horizontal of an arm that is no T-pose
+_OWN_FACE = 3  # targets with names of expressions that make a face
+
+# What older ARKit rigs and VRoid call expressions.
+_OLDER = (
+    "mouthSmile_L", "mouthSmile_R", "eyeBlink_L", "eyeBlink_R", "joy", "sorrow", "a", "i", "u", "e",
+    "o", "Fcl_MTH_A", "Fcl_MTH_I", "Fcl_MTH_U", "Fcl_EYE_Close", "Fcl_ALL_Joy",
+)  # fmt: skip
+
+
+@dataclass
+class Body:
+    """A body.
+
+    Attributes:
+        document: the file.
+        names: of its nodes.
+        parents: of each node, -1 for a root; parents stand before their children.
+        places: float64[n, 3], metres.
+        turns: float64[n, 3, 3], from each node's axes to those of the scene.
+        of_node: number of a node in the file -> its place in these lists.
+        bones: name in VRM 1.0 -> its place in these lists.
+        meshes: their joints are numbers of nodes in the file.
+        scale: metres of a unit of the file.
+        to_scene: float64[4, 4], from the scene of the file to this one.
+        world: number of a node -> float64[4, 4] to this scene.
+        others: names to leave out that are meshes of the face.
+        notes: sentences for the user.
+    """
+
+    document: Document
+    names: list[str]
+    parents: list[int]
+    places: Doubles
+    turns: Doubles
+    of_node: dict[int, int]
+    bones: dict[str, int]
+    meshes: list[BodyMesh]
+    scale: float
+    to_scene: Doubles
+    world: Mapping[int, Doubles]
+    others: list[str]
+    notes: list[str] = field(default_factory=list)
+
+    def above(self, name: str) -> int:
+        """The node of the nearest bone above a bone, or of the head's parent.
+
+        Args:
+            name: of a bone in VRM 1.0.
+        """
+        bone = humanoid.parent_of(name, list(self.bones))
+        return self.bones[bone] if bone else max(0, self.parents[self.bones["head"]])
+
+
+def read_body(
+    path: Path, *, scale: float | None, without: Sequence[str], faces: Set[str], needs_all: bool
+) -> Body:
+    """A body.
+
+    Args:
+        path: of a .glb, .gltf or .vrm.
+        scale: metres of a unit of the file; None: 0.01 if the body is taller than 20 units, else 1.
+        without: names of meshes, or of their nodes, that are left out.
+        faces: names of the face's meshes, which `without` may name too.
+        needs_all: each bone that a VRM needs must be there, else the head alone.
+
+    Raises:
+        GameFaceError: no skeleton, bones are missing, no mesh has a name in `without`.
+        AnimationFileError: the file is damaged; with the place in it.
+        BudgetError: more numbers than a file of this size may hold.
+    """
+    document = _opened(path)
+    tree = find_tree(document)
+    raw = Meshes(document, tree.world)
+    rows = document.json["nodes"]
+    holders = [n for n in tree.order if "mesh" in rows[n]]
+    holders, others = _kept(document, holders, without, faces)
+    joints = {j for n in tree.order if "mesh" in rows[n] and "skin" in rows[n]
+              for j in raw.joints(n)}  # fmt: skip
+    if not joints:
+        raise GameFaceError(f"{path}: a body with a skeleton was expected, no mesh has a skin")
+    bones = bones_of(document, tree, joints)
+    wanted = humanoid.NEEDED if needs_all else ("head",)
+    if missing := [name for name in wanted if name not in bones]:
+        raise GameFaceError(
+            f"{path}: the body has no bone {joined(missing)}: its VRM extension, or names of "
+            "Unreal, Mixamo or VRM, say the bones"
+        )
+    at = {name: tree.world[node][:3, 3] for name, node in bones.items()}
+    scale = scale or _scale_of(at)
+    turn = _facing(at, str(path))
+    to_scene = np.diag([turn * scale, scale, turn * scale, 1.0])
+    world = {number: to_scene @ matrix for number, matrix in tree.world.items()}
+    meshes = Meshes(document, world)
+    rigid = [n for n in holders if "skin" not in rows[n]]
+    own = _Nodes(document, tree, world, bones, joints, rigid)
+    body = Body(
+        document, own.names, own.parents, own.places, own.turns, own.of_node,
+        {name: own.of_node[node] for name, node in bones.items()},
+        [meshes.read(n) for n in holders], scale, to_scene, world, others,
+    )  # fmt: skip
+    for mesh in body.meshes:  # a mesh without a skin turns with the node that it hangs on
+        mesh.joints = [j if j in own.of_node else tree.above[j] for j in mesh.joints]
+    body.notes += _notes(body, path)
+    return body
+
+
+def _opened(path: Path) -> Document:
+    data = read_bytes(path, found=True)
+    budget = Budget.of(len(data), str(path))
+    if is_glb(data):
+        return open_glb(path, data, budget)
+    refuse_other_kinds(data, str(path))
+    return open_gltf(path, named_json.parse(decode(data, str(path)), str(path)), budget=budget)
+
+
+def _kept(
+    document: Document, holders: list[int], without: Sequence[str], faces: Set[str]
+) -> tuple[list[int], list[str]]:
+    """The nodes whose meshes stay, and the names that are meshes of the face.
+
+    Raises: GameFaceError: no mesh has a name.
+    """
+    rows, names = document.json["nodes"], dict[int, tuple[str, str]]()
+    for number in holders:
+        mesh = document.item("meshes", rows[number]["mesh"], f"nodes[{number}].mesh")
+        also = str(mesh.get("name") or f"mesh{rows[number]['mesh']}")
+        names[number] = (str(rows[number].get("name") or also), also)
+    others = [wish for wish in without if not any(wish in pair for pair in names.values())]
+    for wish in others:
+        if wish not in faces:
+            there = joined(sorted({pair[0] for pair in names.values()})) or "none"
+            raise GameFaceError(
+                f"{document.name}: --without {wish}: a mesh of the body was expected: {there}"
+            )
+    return [n for n in holders if not set(names[n]) & set(without)], others
+
+
+def _scale_of(at: Mapping[str, Doubles]) -> float:
+    """Metres of a unit: nobody is 20 m tall."""
+    low = min(float(place[1]) for place in at.values())
+    return 0.01 if float(at["head"][1]) - low > _TALLEST else 1.0
+
+
+def _facing(at: Mapping[str, Doubles], name: str) -> float:
+    """1 for a body that looks along z, -1 for one that looks against z, as VRM 0.x has it."""
+    if "hips" in at and not at["head"][1] > at["hips"][1]:
+        raise GameFaceError(
+            f"{name}: a body that stands upright along y was expected, its head is not above its "
+            "hips"
+        )
+    for part in ("UpperLeg", "UpperArm", "Eye", "Shoulder", "Hand"):
+        left, right = at.get(f"left{part}"), at.get(f"right{part}")
+        if left is not None and right is not None and left[0] != right[0]:
+            return 1.0 if left[0] > right[0] else -1.0
+    return 1.0
+
+
+class _Nodes:
+    """The nodes that the result has: all but those that hold a mesh, or a camera, and no bone."""
+
+    def __init__(
+        self, document: Document, tree: Tree, world: Mapping[int, Doubles], bones: dict[str, int],
+        joints: set[int], rigid: list[int],
+    ) -> None:  # fmt: skip
+        rows = document.json["nodes"]
+        kept = {*bones.values(), *joints}
+        kept |= {tree.above[n] if tree.above[n] >= 0 else n for n in rigid}
+        for number in tree.order:
+            if "mesh" not in rows[number] and "camera" not in rows[number]:
+                kept.add(number)
+        for number in reversed(tree.order):
+            if number in kept and tree.above[number] >= 0:
+                kept.add(tree.above[number])
+        order = [number for number in tree.order if number in kept]
+        self.of_node = {number: i for i, number in enumerate(order)}
+        self.names = [str(rows[n].get("name") or f"Node{n}") for n in order]
+        self.parents = [self.of_node.get(tree.above[n], -1) for n in order]
+        self.places = np.array([world[n][:3, 3] for n in order])
+        self.turns = np.array([_rotation(world[n][:3, :3]) for n in order])
+
+
+def _rotation(matrix: Doubles) -> Doubles:
+    """The rotation of a matrix that also scales."""
+    if not abs(np.linalg.det(matrix)) > 1e-30:
+        return np.eye(3)
+    left, _, right = np.linalg.svd(matrix)
+    sign = np.sign(np.linalg.det(left @ right))
+    out = np.asarray((left * [1.0, 1.0, sign]) @ right, np.float64)
+    # Digits behind the twelfth are those of the products above a node.
+    return np.where(np.abs(out - np.rint(out)) < 1e-9, np.rint(out), out)
+
+
+def _notes(body: Body, path: Path) -> list[str]:
+    out = list[str]()
+    known = {name.lower() for name in (*arkit.mapping(), *PRESETS, *_OLDER)} - {"neutral"}
+    faces, example, most = list[str](), "", 0
+    for mesh in body.meshes:
+        named = [name for name in mesh.targets if _plain(name) in known]
+        if len(named) >= _OWN_FACE:
+            faces.append(mesh.name)
+            most = max(most, len(named))
+            example = example or named[0]
+    if faces:
+        out.append(
+            f"{path.name}: the body has a face of its own, {joined(faces)}, with up to {most} "
+            f"targets such as {example}: {' '.join(f'--without {_quoted(n)}' for n in faces)} "
+            "leaves it out"
+        )
+    for side in ("left", "right"):
+        pair = [body.bones.get(f"{side}{part}") for part in ("UpperArm", "LowerArm")]
+        if pair[0] is not None and pair[1] is not None:
+            along = body.places[pair[1]] - body.places[pair[0]]
+            angle = float(np.degrees(np.arctan2(-along[1], abs(along[0]))))
+            if angle > _HANGING:
+                out.append(
+                    f"{path.name}: its arms hang {angle:.0f} degrees below a T-pose, which VRM "
+                    "expects: motions of other bodies will look wrong"
+                )
+                break
+    count = len(body.document.json.get("animations") or ())
+    if count:
+        out.append(f"{path.name}: its animations are left out ({count})")
+    return out
+
+
+def _quoted(name: str) -> str:
+    return name if name.replace("_", "").isalnum() else f'"{name}"'
+
+
+def _plain(name: str) -> str:
+    """A target's name without what VRoid and others put before it."""
+    return name.rpartition(".")[2].lower()

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: MIT
+"""Joints in long hair: cards that hang are gathered by direction, and each bundle gets a chain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from ...base.easing import smooth_step
+from .skeleton import Skeleton
+from .weights import INFLUENCES, strongest
+
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+HANGS = 0.04  # metres between the root and the tip of a card that swings
+_BUNDLES = 12
+_SEGMENT = 0.05  # metres between joints
+_JOINTS = (2, 4)
+_WIDEST = 0.15  # metres: a wider piece is hair in one piece, which no chain can follow
+_BAND = 0.015  # metres above and below a joint whose hair it lies in
+_FIRM = 0.3  # share of a card, from its root, over which it begins to swing
+_FEWEST = 12  # roots that a sphere is fitted to
+_SKULL = (0.05, 0.11)  # metres, radius
+_HIT = 0.01  # metres, radius of a joint
+
+
+@dataclass(frozen=True)
+class Hair:
+    """A mesh of hair cards.
+
+    Attributes:
+        points: float64[V, 3], metres, y up.
+        rows: int64[V], equal where vertices are one point.
+        triangles: int64[T, 3].
+        joints, weights: int64 and float64[V, 4].
+    """
+
+    points: Doubles
+    rows: Ints
+    triangles: Ints
+    joints: Ints
+    weights: Doubles
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Joints that swing.
+
+    Attributes:
+        joints: of each chain, from the root to the tip, which moves no vertex.
+        centre: float64[3], metres, of a sphere in the head.
+        radius: metres, of that sphere.
+        hit: metres, radius of a joint against the sphere.
+    """
+
+    joints: list[list[int]] = field(default_factory=list)
+    centre: Doubles = field(default_factory=lambda: np.zeros(3))
+    radius: float = 0.0
+    hit: float = _HIT
+
+
+@dataclass(frozen=True)
+class Cards:
+    """Cards of a mesh.
+
+    Attributes:
+        of_vertex: int64[V], the card of each vertex.
+        root, tip: float64[cards], heights in metres.
+        middle, roots: float64[cards, 3], metres.
+        hangs: bool[cards], whether it swings.
+    """
+
+    of_vertex: Ints
+    root: Doubles
+    tip: Doubles
+    middle: Doubles
+    roots: Doubles
+    hangs: npt.NDArray[np.bool_]
+
+
+def is_long(points: Doubles, triangles: Ints) -> bool:
+    """Whether a card hangs farther than HANGS below its root.
+
+    Args:
+        points: float64[V, 3], metres, y up.
+        triangles: int64[T, 3].
+    """
+    return len(triangles) > 0 and bool(
+        find_cards(points, np.arange(len(points)), triangles).hangs.any()
+    )
+
+
+def add_chains(skeleton: Skeleton, hairs: Sequence[Hair]) -> tuple[Skeleton, Chains, list[Hair]]:
+    """A skeleton with chains in long hair, which hang on the head.
+
+    The weights of a card pass from the head at its root to the chain. All vertices stay where they
+    are as long as no joint moves.
+
+    Args:
+        skeleton: of the face.
+        hairs: its meshes of long hair.
+    """
+    cards = [find_cards(hair.points, hair.rows, hair.triangles) for hair in hairs]
+    chains = Chains(centre=skeleton.places[skeleton.head])
+    if not any(one.hangs.any() for one in cards):
+        return skeleton, chains, list(hairs)
+    roots = np.concatenate([one.roots for one in cards])
+    centre, radius = _skull(roots, skeleton.places[skeleton.head])
+    names, parents, places = list(skeleton.names), list(skeleton.parents), list(skeleton.places)
+    made = list(hairs)
+    bundles = [_bundle(one.middle - centre) for one in cards]
+    for bundle in range(_BUNDLES):
+        members = [one.hangs & (of == bundle) for one, of in zip(cards, bundles, strict=True)]
+        if not any(member.any() for member in members):
+            continue
+        line = _line(hairs, cards, members)
+        chain = list(range(len(names), len(names) + len(line)))
+        names += [f"Hair{len(chains.joints) + 1}_{i + 1}" for i in range(len(line))]
+        parents += [skeleton.head, *chain[:-1]]
+        places += list(line)
+        chains.joints.append(chain)
+        for i, one in enumerate(cards):
+            made[i] = _woven(made[i], one, members[i], chain, line[:, 1])
+    tails = np.array([places[joint] for chain in chains.joints for joint in chain[1:]])
+    free = float(np.linalg.norm(tails - centre, axis=1).min()) - _HIT
+    straight = np.tile(np.eye(3), (len(names) - len(skeleton.names), 1, 1))
+    turns = np.concatenate([skeleton.turns, straight])
+    out = replace(skeleton, names=names, parents=parents, places=np.array(places), turns=turns)
+    return out, replace(chains, centre=centre, radius=max(0.01, min(radius, free))), made
+
+
+def find_cards(points: Doubles, rows: Ints, triangles: Ints) -> Cards:
+    """The pieces of a mesh that are not connected to each other.
+
+    Args:
+        points: float64[V, 3], metres, y up.
+        rows: int64[V], equal where vertices are one point.
+        triangles: int64[T, 3].
+    """
+    _, place = np.unique(rows, return_inverse=True)
+    corners = place[triangles]
+    label = np.arange(int(place.max(initial=-1)) + 1)
+    while True:  # each piece takes its lowest number
+        low = label[corners].min(axis=1)
+        new = label.copy()
+        np.minimum.at(new, corners.ravel(), np.repeat(low, 3))
+        new = new[new]
+        if np.array_equal(new, label):
+            break
+        label = new
+    _, card = np.unique(label[place], return_inverse=True)
+    count = int(card.max(initial=-1)) + 1
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, card, points)
+    np.maximum.at(high, card, points)
+    sums = np.stack([np.bincount(card, points[:, k], count) for k in range(3)], axis=1)
+    middle = sums / np.maximum(np.bincount(card, minlength=count), 1)[:, None]
+    order = np.lexsort((-points[:, 1], card))  # the highest vertex of each card is its root
+    first = order[np.searchsorted(card[order], np.arange(count))]
+    wide = np.maximum(high[:, 0] - low[:, 0], high[:, 2] - low[:, 2])
+    hangs = (high[:, 1] - low[:, 1] > HANGS) & (wide < _WIDEST)
+    return Cards(card, high[:, 1], low[:, 1], middle, points[first], hangs)
+
+
+def _bundle(away: Doubles) -> Ints:
+    """int64[n], the sector about the vertical of directions from the centre."""
+    angle = np.arctan2(away[:, 0], away[:, 2])
+    return np.rint(angle / (2 * np.pi) * _BUNDLES).astype(np.int64) % _BUNDLES
+
+
+def _skull(roots: Doubles, head: Doubles) -> tuple[Doubles, float]:
+    """The centre and radius of a sphere through the roots of hair."""
+    guess = head + np.array([0.0, 0.07, 0.0])
+    if len(roots) < _FEWEST:
+        return guess, 0.08
+    middle = roots.mean(axis=0)
+    rows = np.c_[2 * (roots - middle), np.ones(len(roots))]
+    found, _, rank, _ = np.linalg.lstsq(rows, ((roots - middle) ** 2).sum(axis=1), rcond=1e-6)
+    square = float(found[3] + found[:3] @ found[:3])
+    if rank < 4 or square <= 0 or not _SKULL[0] <= square**0.5 <= 2 * _SKULL[1]:
+        return guess, 0.08
+    return middle + found[:3], min(_SKULL[1], 0.95 * square**0.5)
+
+
+def _line(
+    hairs: Sequence[Hair], cards: Sequence[Cards], members: Sequence[npt.NDArray[np.bool_]]
+) -> Doubles:
+    """float64[n, 3], the joints of a bundle, at even heights: each amid the hair that is there."""
+    picked = list(zip(hairs, cards, members, strict=True))
+    top = float(np.mean(np.concatenate([one.root[member] for _, one, member in picked])))
+    low = float(np.percentile(np.concatenate([one.tip[member] for _, one, member in picked]), 25))
+    low = min(low, top - HANGS / 2)
+    points = np.concatenate([hair.points[m[one.of_vertex]] for hair, one, m in picked])
+    heights = np.linspace(top, low, int(np.clip(np.rint((top - low) / _SEGMENT) + 1, *_JOINTS)))
+    away = np.abs(points[:, 1] - heights[:, None])
+    near = np.exp(-((away / _BAND) ** 2)) + 1e-9 * (away == away.min(axis=1, keepdims=True))
+    line = near @ points / near.sum(axis=1, keepdims=True)
+    line[:, 1] = heights
+    return line
+
+
+def _woven(
+    hair: Hair, cards: Cards, member: npt.NDArray[np.bool_], chain: list[int], heights: Doubles
+) -> Hair:
+    """Hair whose cards of a bundle hang on its chain."""
+    vertices = np.flatnonzero(member[cards.of_vertex])
+    if not len(vertices):
+        return hair
+    card, height = cards.of_vertex[vertices], hair.points[vertices, 1]
+    own = (cards.root[card] - height) / (cards.root[card] - cards.tip[card])
+    share = smooth_step(own / _FIRM)
+    moving = len(chain) - 1
+    along = np.interp(-height, -heights, np.arange(len(heights))) - 0.5
+    upper = np.clip(np.floor(along).astype(np.int64), -1, moving - 1)
+    lower = np.minimum(upper + 1, moving - 1)
+    part = np.clip(along - upper, 0, 1)
+    every = np.arange(len(vertices))
+    dense = np.zeros((len(vertices), max(INFLUENCES, chain[-1] + 1)))
+    pulled = np.zeros_like(dense)
+    for number, weight in ((upper, (1 - part) * share), (lower, part * share)):
+        # Above the first joint, which is number -1, the head holds the hair.
+        np.add.at(pulled, (every, np.array(chain)[number]), np.where(number < 0, 0.0, weight))
+    for k in range(hair.joints.shape[1]):
+        np.add.at(dense, (every, hair.joints[vertices, k]), hair.weights[vertices, k])
+    dense = dense * (1 - pulled.sum(axis=1, keepdims=True)) + pulled
+    joints, weights = hair.joints.copy(), hair.weights.copy()
+    joints[vertices], weights[vertices] = strongest(dense)
+    return replace(hair, joints=joints, weights=weights)

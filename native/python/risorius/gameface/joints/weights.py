@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: MIT
+"""The joints of a vertex that every client takes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Doubles = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+INFLUENCES = 4
+
+
+def strongest(dense: Doubles) -> tuple[Ints, Doubles]:
+    """int64 and float64[V, INFLUENCES]: joints and shares of 1, in steps of 1 / 255.
+
+    Args:
+        dense: float64[V, joints], INFLUENCES joints or more; each row has a weight above 0.
+    """
+    joints = np.argsort(-dense, axis=1, kind="stable")[:, :INFLUENCES]
+    weights = np.take_along_axis(dense, joints, axis=1)
+    steps = np.rint(255 * weights / weights.sum(axis=1, keepdims=True))
+    steps[:, 0] += 255 - steps.sum(axis=1)  # the strongest takes what rounding leaves
+    joints[steps <= 0] = 0
+    return joints, steps / 255
