@@ -148,3 +148,30 @@ def test_the_search_for_a_face_tells_how_far_it_is_and_stops() -> None:
     with pytest.raises(Stopped):
         find_form(mean(), Hints(up=Y, front=Z), stop)
     assert len(told) < len(heard)
+
+
+def test_lids_go_until_they_meet() -> None:
+    height = np.linspace(-1, 1, 21)
+    grid = np.array([[x, y, 0.0] for y in height for x in np.linspace(-1, 1, 11)])
+    cells = np.arange(21 * 11).reshape(21, 11)
+    a, b, c, d = cells[:-1, :-1], cells[:-1, 1:], cells[1:, 1:], cells[1:, :-1]
+    open_ = np.ones((20, 10), bool)
+    open_[8:12] = False  # the opening between the lids
+    triangles = np.concatenate([np.stack([a, b, c], -1)[open_], np.stack([a, c, d], -1)[open_]])
+    way = np.zeros_like(grid)
+    upper = grid[:, 1] > 0.15
+    way[upper, 1] = -0.4 * np.clip((1 - grid[upper, 1]) / 0.8, 0, 1)
+    way[~upper & (grid[:, 1] < -0.15), 1] = -0.03
+    way[(grid[:, 1] == height[8]), 1] = 0.0
+    way[grid[:, 1] == height[8], 1] = -0.03
+    way[grid[:, 1] == height[12], 1] = -0.43
+    pose = ("eyeBlinkL",)
+    face = TemplateFace("", Surface(grid, triangles), 0, pose, {pose: way.astype(np.float32)}, None)
+    narrow = grid.copy()
+    narrow[grid[:, 1] > 0, 1] -= 0.1  # the form of the lids is the same, the opening is not
+    got = Carrying(face, narrow, np.ones(len(grid))).carried(pose)
+    edge, below = grid[:, 1] == height[12], grid[:, 1] == height[8]
+    gap = (narrow + got)[edge, 1] - (narrow + got)[below, 1]
+    assert np.abs(gap).max() < 0.02
+    brow = grid[:, 1] > 0.85
+    assert np.abs(got[brow] - way[brow]).max() < 0.02
