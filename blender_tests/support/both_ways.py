@@ -1,21 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One face in Direct mode compared with the same face in Live mode, which Blender deforms."""
+"""Compares a face in Direct mode with the same face in Live mode, which Blender deforms."""
 
 import bpy
 import numpy as np
 
 from . import scene
 
-NEAR = 1e-5  # of the face's size
+NEAR = 1e-5  # tolerated distance, relative to the face's size
 
 
 def plan(rig):
-    """How a face was last shown: conditions.Plan."""
+    """The last conditions.Plan of a face: which meshes have finished positions."""
     return scene.submodule("scene.skinning.conditions").known(rig)
 
 
 def is_direct(rig, *numbers):
-    """Whether meshes of a face, or all, have finished positions and disabled modifiers."""
+    """Whether some or all meshes of a face have finished positions and disabled modifiers."""
     items = scene.meshes(rig)
     wanted = [items[n] for n in numbers or items]
     off = all(not m.modifiers[0].show_viewport for m in wanted)
@@ -45,7 +45,7 @@ def normals(item):
 
 
 def bones(rig):
-    """float64[B, 4, 4], the posed matrices that Blender has of the deforming armature."""
+    """float64[B, 4, 4]: posed matrices of the evaluated deforming armature's bones."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     flat = np.empty(len(seen) * 16, np.float32)
     seen.foreach_get("matrix", flat)
@@ -53,16 +53,16 @@ def bones(rig):
 
 
 def settle():
-    """Let Blender evaluate edits and the add-on's writes after them."""
+    """Let Blender evaluate edits, and then the values that the add-on wrote in response."""
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()
 
 
 class Pair:
-    """The face of a file twice.
+    """Two imports of a file at the same place, one in Direct mode and one in Live mode.
 
     Attributes:
-        direct, live: deforming armatures of the face in Direct mode, and of the one in Live mode.
+        direct, live: deforming armatures of the face in Direct mode and of the face in Live mode.
     """
 
     def __init__(self, path, **options):
@@ -82,13 +82,13 @@ class Pair:
         settle()
 
     def edit(self, change):
-        """Make one edit of both faces. Args: change  function of a rig and its head mesh."""
+        """Make an edit of both faces. Args: change: function of the armature and the head mesh."""
         done = [change(rig, scene.meshes(rig)[0]) for rig in self.each()]
         settle()
         return done
 
     def apart(self, lod=0):
-        """The largest distance between meshes as seen from their rigs, over the face's size."""
+        """Largest distance between both faces' vertices in armature space, over the face's size."""
         found = []
         for rig in self.each():
             place = np.linalg.inv(np.array(rig.matrix_world))
@@ -100,11 +100,11 @@ class Pair:
         return max(float(np.abs(a - b).max()) for a, b in pairs) / size
 
     def bones_apart(self):
-        """The largest difference of elements of posed bone matrices."""
+        """The largest difference between elements of both faces' posed bone matrices."""
         return float(np.abs(bones(self.direct) - bones(self.live)).max())
 
     def check(self, near=NEAR):
-        """Both show the same, and do so when they move."""
+        """Assert that both faces have the same shape in two poses."""
         for values in ((0.9, 0.2), (0.3, 0.8)):
             self.set(jawOpen=values[0], mouthCornerPullL=values[1])
             assert self.apart() < near

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One step in the life of an installed extension, in a Blender process of its own.
+"""Installs, uses, disables or removes the extension: one step per Blender process.
 
-    blender -b --python extension_steps.py -- STEP [ARGUMENTS] python extension_steps.py -- STEP
-    [ARGUMENTS]
+    blender -b --python extension_steps.py -- STEP [ARGUMENTS]
+    python extension_steps.py -- STEP [ARGUMENTS]
 
 It prints its result as one line of JSON after `RESULT `. An exception gives exit code 1.
 """
@@ -21,7 +21,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """Everything of the add-on that this process can see."""
+    """The add-on's handlers, classes, operators, properties and menus in this process."""
     handlers = [
         name
         for name in dir(bpy.app.handlers)
@@ -47,7 +47,7 @@ def _list(value):
 
 
 def _manager():
-    """The part of Blender that installs extensions; as a module it starts without."""
+    """Enable Blender's installer of extensions, which the bpy module does not enable."""
     import addon_utils
 
     if "bl_pkg" not in bpy.context.preferences.addons:
@@ -67,7 +67,7 @@ def _read_preferences(step):
 
 
 def install(package):
-    """As a user does it: Preferences, Install from Disk."""
+    """Install the package and enable it, as by Preferences > Install from Disk."""
     _manager()
     bpy.ops.extensions.package_install_files(
         filepath=package, repo="user_default", enable_on_install=True
@@ -77,13 +77,13 @@ def install(package):
 
 
 def _vertices(item):
-    """The shown vertices of a mesh."""
+    """The evaluated vertices of a mesh."""
     graph = bpy.context.evaluated_depsgraph_get()
     return [tuple(v.co) for v in item.evaluated_get(graph).data.vertices]
 
 
 def use(path):
-    """Import a face, move it, save the scene beside the file."""
+    """Import a face, move it, and save the scene in the folder of the DNA file."""
     assert bpy.ops.risorius.import_dna(filepath=path) == {"FINISHED"}
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     bone = rig["risorius_controls"].pose.bones["face"]
@@ -99,7 +99,7 @@ def use(path):
 
 
 def add(_nothing=""):
-    """Add > Face, without network access."""
+    """Add the sample face by Add > Face; fail if that starts another program."""
 
     def forbidden(*_arguments, **_options):
         raise AssertionError("the sample face needs another program")
@@ -124,7 +124,7 @@ def add(_nothing=""):
 
 
 def disable(_nothing=""):
-    """As a user does it: the check box in the preferences."""
+    """Disable the add-on, as by the check box in the preferences."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     bpy.ops.wm.save_userpref()
     return of_ours()
@@ -139,7 +139,7 @@ def look(blend):
 
 
 def remove(_nothing=""):
-    """As a user does it: Uninstall."""
+    """Uninstall the extension, as by Uninstall in the preferences."""
     _manager()
     names = [r.module for r in bpy.context.preferences.extensions.repos]
     bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="risorius")

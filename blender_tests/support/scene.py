@@ -10,7 +10,7 @@ import risorius
 from . import oracle
 
 MODULE = "bl_ext.user_default.risorius"
-TOLERANCE = 1e-4  # of the head's size: float32 of Blender and bone axes kept as a roll angle
+TOLERANCE = 1e-4  # relative to the head's size, for float32 and bone axes stored as a roll
 
 
 def submodule(name):
@@ -28,18 +28,18 @@ def load(path, mode="AUTO", **options):
 
 
 def add_board(kind="COMPLETE"):
-    """Give the active face a board; the mode is object mode then."""
+    """Add a board to the active face, and return to object mode."""
     assert bpy.ops.risorius.add_board(kind=kind) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def controls(rig):
-    """The control armature."""
+    """The control armature of a deforming armature."""
     return rig["risorius_controls"]
 
 
 def face(rig):
-    """The bone with the sliders."""
+    """The pose bone whose custom properties are the sliders."""
     return controls(rig).pose.bones["face"]
 
 
@@ -50,14 +50,14 @@ def meshes(rig):
 
 
 def update(*items):
-    """Tag objects and evaluate."""
+    """Tag objects as changed and evaluate the view layer."""
     for item in items:
         item.update_tag()
     bpy.context.view_layer.update()
 
 
 def set_controls(rig, **values):
-    """Set sliders by the ends of their names, as an edit does."""
+    """Set sliders, named by the ends of their names, and evaluate the scene."""
     bone = face(rig)
     for end, value in values.items():
         name = next(k for k in bone.keys() if k.endswith(end))  # noqa: SIM118
@@ -77,7 +77,7 @@ def evaluated(item):
 
 
 def raw_of(rig, path):
-    """The raw controls that the sliders ask for now, by index."""
+    """float32[R]: the raw control values of the sliders."""
     labels = submodule("logic.base.names").unique_labels(risorius.load(str(path)).raw_control_names)
     return np.array([float(face(rig)[n]) for n in labels], np.float32)
 
@@ -121,7 +121,7 @@ def snapshot(rig):
 
 
 def counts():
-    """How many datablocks of every kind there are."""
+    """Kind of datablock -> number in the file."""
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A file of its own, because every commit recompiles it.
+// A separate file, because it contains the commit and is recompiled after every commit.
 #include "bench/machine.h"
 
 namespace risorius::bench {

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A second evaluator in double precision, straight from the format's semantics.
+"""Evaluates DNA files in double precision, directly by the semantics of the format.
 
-It shares no code with the native one and knows no layout, SIMD or scheduling. For each value it
-also returns a bound of the float32 error: a sum of n products rounded in any order errs by at most
+It shares no code with the native evaluator and does not optimise. For each value it also returns a
+bound of the float32 error: a sum of n products rounded in any order errs by at most
 (n + 1) * eps * sum|k x|, and the inputs of the sum are correctives that already err by (factors +
 1) * eps relative.
 """
@@ -14,7 +14,7 @@ FACTORS = 16  # more factors than any corrective here has
 
 
 def table(conditionals, rows, values, output_count):
-    """Conditional table -> outputs [O] and bounds [O]."""
+    """Outputs [O] of a conditional table, and bounds [O] of their float32 errors."""
     out = np.zeros(output_count)
     size = np.zeros(output_count)
     columns = [
@@ -55,7 +55,7 @@ def correctives(dna, controls, used, settle):
 
 
 def used_controls(dna, lod):
-    """Controls that something reads at the LOD."""
+    """The set of control indices that are read at the LOD."""
     used = set()
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
@@ -102,16 +102,16 @@ def quaternion_to_matrix(q):
 
 
 def is_quaternion(dna, joint):
-    """Declared so by the file's joint metadata."""
+    """Whether the file's joint metadata declares the joint's rotation to be a quaternion."""
     given = dna.joint_behavior_metadata.joint_representations
     return joint < len(given) and given[joint][1] == 1
 
 
 def column_order(dna, group):
-    """The columns that turn quaternion joints, as the reference's storage of LODs leaves them.
+    """Columns that rotate quaternion joints, in the order that the reference stores them.
 
-    LOD by LOD, finest first: look down from the end for a column that is zero in all rotation rows
-    of the LOD; it changes places with the one at the end, and the end moves up by one.
+    For each LOD, finest first: search backwards from the end for a column that is zero in all
+    rotation rows of the LOD, swap it with the column at the end, and move the end back by one.
     """
     matrix, outputs = np.asarray(group.values), np.asarray(group.output_indices).tolist()
     turning = [r for r, o in enumerate(outputs) if 3 <= o % 9 <= 5 and is_quaternion(dna, o // 9)]

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the option --conform.
 
     Args:
-        parser: of `risorius author`.
+        parser: parser of `risorius author`.
     """
     parser.add_argument(
         "--conform",
@@ -57,11 +57,11 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
     """risorius author --conform HEAD FACE.dna -o OUT.dna
 
     Args:
-        args: of `risorius author`.
-        clock: told the steps.
+        args: arguments of `risorius author`.
+        clock: prints the steps.
 
     Raises:
-        CommandLineError: options that do not go together.
+        CommandLineError: options exclude each other.
         RisoriusError: the face, the head or landmarks cannot be used.
         OSError: a file cannot be read or written.
     """

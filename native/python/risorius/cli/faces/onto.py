@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author --onto: a head without expressions gets those of a template."""
+"""risorius author --onto: transfers the expressions of a template to a head without any."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ _OWN = (
 
 
 class Clock(Protocol):
-    """Says what is done now, and how far it is."""
+    """Prints the current step and its progress."""
 
     def line(self, text: str) -> None: ...
     def __call__(self, share: float) -> None: ...
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The options of --onto.
+    """Add --onto and its options.
 
     Args:
-        parser: of `risorius author`.
+        parser: parser of `risorius author`.
     """
     group = parser.add_argument_group("a head without expressions")
     group.add_argument(
@@ -91,13 +91,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_arguments(args: argparse.Namespace) -> None:
-    """Refuse options that do not go together.
+    """Refuse options that exclude each other.
 
     Args:
-        args: of `risorius author`.
+        args: arguments of `risorius author`.
 
     Raises:
-        CommandLineError: says which.
+        CommandLineError: names the option.
     """
     if args.onto is None:
         given = [name for name in _OWN if getattr(args, name) is not None]
@@ -118,29 +118,29 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def spec_of(args: argparse.Namespace) -> Spec:
-    """The options of the rig, as a spec of the head.
+    """A spec of the head with the rig options of --rig.
 
     Args:
-        args: of `risorius author`, checked.
+        args: checked arguments of `risorius author`.
 
     Raises:
         ShapeFileError: the file of --rig cannot be used.
-        OSError: it cannot be read.
+        OSError: the file of --rig cannot be read.
     """
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
-    if spec.options.tolerance_mm is None:  # a share of the head, and not of the body below it
+    if spec.options.tolerance_mm is None:  # a fraction of the head, not of the whole body
         spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
 
 
 def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, bytes]]:
-    """The head with the template's expressions, and files to be written beside the face.
+    """The head with the template's expressions, and additional files to write: path -> bytes.
 
     Args:
-        args: of `risorius author`, checked.
-        clock: told the steps.
+        args: checked arguments of `risorius author`.
+        clock: prints the steps.
 
     Raises:
         RisoriusError: the head, the template or landmarks cannot be used.
