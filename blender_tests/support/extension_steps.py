@@ -55,8 +55,8 @@ def _manager():
 
 
 def _read_preferences(step):
-    """The module bpy starts with factory settings. Before 4.5 it crashes when it reads the user's
-    settings, so the extension is enabled by hand there."""
+    """Read the user's preferences, because bpy starts with factory settings. bpy before 4.5 crashes
+    while reading them; there, the extension is enabled directly."""
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
     elif step in ("use", "add", "disable", "remove"):

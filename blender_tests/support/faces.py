@@ -283,14 +283,14 @@ def other_face(**options):
         maps=[1, "new_map", 0],
     )
     offsets = dna.neutral_joint_translations.copy()
-    offsets[2] += [0.5, 1.0, 0.0]  # the neck
+    offsets[2] += [0.5, 1.0, 0.0]  # an offset of the neck joint
     dna.neutral_joint_translations = offsets
     return dna
 
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
 UP, SIDE = 1, 2  # poses of neck_face
-# Rotations of neck_01 and head for each pose, relative to rest, about their own axes.
+# Quaternions of neck_01 and head for each pose, relative to rest, in their own axes.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),
     (0, 0, 0.0871557, 0.9961947, 0, 0, 0.2164396, 0.9762960),

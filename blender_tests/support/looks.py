@@ -89,8 +89,7 @@ def stage(items, size=32, engine="CYCLES", samples=4):
     """Light the scene evenly and look at some objects from the front (-y).
 
     Returns:
-        The scene, and the function that tells which x and z a pixel shows:
-        float[size, size] each.
+        The scene, and the x and z coordinates that each pixel shows: float[size, size] each.
     """
     setup = bpy.context.scene
     setup.render.engine = engine

@@ -18,7 +18,7 @@ _MARGIN = 10  # pixels around the text of a label; a button has more
 _BUTTON = 14
 _ICON = 20
 _ASKED = 30  # pixels that a button requests from a row in addition to its text
-_NUMBER = 60  # a number for more
+_NUMBER = 60  # the same for a number field
 _NAMES = 0.4
 _VALUE = "0.000"
 # Heights measured in a window of Blender 4.3, where they are larger than in 5.2.

@@ -13,7 +13,7 @@ DATA = Path(__file__).resolve().parents[1] / "data" / "past"
 FRAMES = (1.0, 4.5, 9.0, 14.0, 20.0, 31.0)
 AS_SAVED = "as saved"
 LIVE_AGAIN = "live again"
-# File -> preparation before playing: the name of an action to assign.
+# File -> ways to play it: as saved, unbaked (LIVE_AGAIN), or with the named action assigned.
 PLAYS = {
     "layers": (AS_SAVED, "Other"),
     "meta": (AS_SAVED,),

@@ -10,7 +10,7 @@ from . import scene
 from .egg import face_shapes
 
 METRES = 0.01
-# Landmarks of the formula's face, in centimetres with y up; the chin is not found.
+# Landmarks of the head of face_shapes, in cm with y up; the chin is missing on purpose.
 PLACES = {
     "eye_inner_L": (2.0, 3.0, 9.0),
     "eye_inner_R": (-2.0, 3.0, 9.0),

@@ -83,9 +83,9 @@ def raw_of(rig, path):
 
 
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
-    """Largest distance between Blender's vertices and the oracle's, over the mesh's size.
+    """Largest distance between Blender's vertices and the oracle's, relative to the mesh's size.
 
-    The face may be at any place.
+    The transform of the armature may be arbitrary.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))
@@ -110,7 +110,7 @@ def curves(item):
 
 
 def pose_bones(rig):
-    """Let a face leave Direct mode: the bones of its deforming armature are posed from now on."""
+    """Switch a face from Direct to Live mode, so that its deforming armature has posed bones."""
     rig["risorius_skinning"] = "LIVE"
     update(controls(rig))
 
@@ -125,7 +125,7 @@ def counts():
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
-        if p.type == "COLLECTION" and p.identifier != "all_ids"  # since 5.2, all others together
+        if p.type == "COLLECTION" and p.identifier != "all_ids"  # since 5.2, contains all others
     }
 
 

@@ -22,7 +22,7 @@ from risorius import Clip
 
 Pack = Callable[[Curves], bytes]
 Unpack = Callable[[bytes, Curves], Curves]  # the second argument has the shape of the result
-RUNS = 5  # of each measurement; the shortest time counts
+RUNS = 5  # times that unpacking is measured; the shortest time counts
 
 
 def rzc(_: object) -> tuple[Pack, Unpack]:

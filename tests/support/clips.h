@@ -119,7 +119,8 @@ inline std::string reading_clip(View bytes, clip::Ends ends) {
   return is_same ? "" : "written and read again a clip is another";
 }
 
-/// Like reading_clip, for the bytes of a block's curves.
+/// Decodes bytes as a block's curves, which must give the same success for all curves together as
+/// for each curve alone. Out: the broken promise, or empty
 inline std::string reading_curves(View bytes, std::size_t controls, std::size_t frames) {
   const auto curves = clip::EncodedCurves::open(bytes, controls, frames);
   if (!curves) return curves.error().message.empty() ? "an error that says nothing" : "";
@@ -137,7 +138,8 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
   return "";
 }
 
-/// Encodes the bytes as float32 curves: all bits must be preserved, with little additional space.
+/// Encodes bytes as float32 curves, which must preserve all bits and take little additional space.
+/// Out: the broken promise, or empty
 inline std::string keeping_bits(View bytes, std::size_t controls) {
   const std::size_t frames =
       std::min<std::size_t>(bytes.size() / 4 / controls, clip::kMostBlockFrames);

@@ -83,7 +83,7 @@ inline dna::BlendShapeTarget make_target(std::uint16_t channel, std::uint32_t de
   return t;
 }
 
-/// Quads over all vertices; every vertex has the first three to six joints of `joints`.
+/// A mesh of quads; each vertex is weighted to the first three to six of the joints.
 inline dna::Mesh make_head_mesh(std::uint32_t vertices, std::uint16_t joints,
                                 std::uint16_t channels, std::uint32_t deltas) {
   dna::Mesh m;

@@ -420,7 +420,7 @@ def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
     assert len(chosen) == len(set(chosen)) == 20
     folds = [on for on in chosen if on[0] == 1]
     assert 8 <= len(folds) <= 12
-    # The pairs with the most volume and the most folds are chosen.
+    # Of the pairs with volume, the pairs with the largest volume are chosen.
     assert {on for on in chosen if on[0] == 0} == {(0, i) for i in range(len(folds) + 1, 21)}
     assert set(fairest_of(sums, 40)) == set(fairest_of(sums, 999)) == set(sums) - {(2, 50)}
     assert fairest_of(sums, 0) == []

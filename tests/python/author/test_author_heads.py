@@ -312,7 +312,7 @@ def test_a_missing_texture_and_a_mesh_of_shared_materials_are_told(tmp_path):
     apart = read(saved(tmp_path, parts(skull), materials=materials, images=[picture]))
     assert list(apart.dna.mesh_names) == ["head_lod0_mesh", "Head_Lips_lod0_mesh"]
     assert [len(m.positions) for m in apart.dna.meshes] == [506, len(points) - 506]
-    materials[1]["name"] = "EyeWhite"  # the material is cut off, because lids hide its border
+    materials[1]["name"] = "EyeWhite"  # a mesh of its own, because lids hide its border
     cut = read(saved(tmp_path, parts(half), materials=materials, images=[picture]))
     assert [cut.materials[n].name for n in cut.dna.mesh_names] == ["Skin", "EyeWhite"]
     assert sum(len(m.positions) for m in cut.dna.meshes) > len(points)

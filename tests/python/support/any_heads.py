@@ -117,7 +117,7 @@ def generator():
 
 
 def random_person(seed: int, source):
-    """A person with random age, build, origin and facial features."""
+    """A person with random gender, age, build, origin and facial features."""
     from risorius_people.people import MAN
     from risorius_people.source import TARGETS
 
