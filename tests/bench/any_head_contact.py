@@ -45,7 +45,7 @@ HEADS = ("head", "gap mm", "seen mm2", "cut mm", "lips mm", "lips in mm", "teeth
 
 
 def seen_of_eyes(skin, triangles, eyes):
-    """The visible area of the eyes in mm2, from the view of VIEWS with the largest area."""
+    """The largest visible area of a single eye in mm2, over all eyes and all VIEWS."""
     worst = 0.0
     for aside, up in VIEWS:
         a, u = np.radians(aside), np.radians(up)

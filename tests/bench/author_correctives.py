@@ -52,8 +52,8 @@ def corners_of(mesh):
 
 
 def undone(search, on, mesh):
-    """Numbers of moving vertices without a fault: (all of them, those that keep less than KEPT of
-    their motion, those of them further than REACH_MM from a fault, those changed by over 0.01 mm).
+    """Numbers of moving vertices without a fault: (all; held back: keeping less than KEPT of their
+    motion; held back and over REACH_MM from a fault; changed by over 0.01 mm).
 
     Args:
         search: the search, after it has repaired the pair.
