@@ -76,7 +76,7 @@ run_script() { # run_script PATH [OPTION...]: runs a script of packaging/ and ta
     note "$name" "$good" "$bad"
   done < <(grep -P '^row\t' "$log")
   while IFS=$'\t' read -r _ name; do say "$name"; done < <(grep -P '^say\t' "$log")
-  # A script that only prints NOT RUN adds no row.
+  # A successful script that only prints NOT RUN adds no row.
   [ "$code" -eq 0 ] && ! grep -qP '^row\t' "$log" && grep -qP '^say\t' "$log" && return
   check "$script" [ "$code" -eq 0 ] || tail -n 40 "$log"
 }
@@ -136,7 +136,7 @@ run_blender() {
   log="$logs/blender-$(echo "$name" | tr -c 'a-zA-Z0-9.\n' '-').log"
   shift 2
   rm -f "$log.xml"
-  # A temporary user folder, set here because Blender reads it before the tests could set it.
+  # A temporary user folder. Blender reads the variable before the tests could set it.
   user=$(mktemp -d)
   BLENDER_USER_RESOURCES="$user" limited 2400 "$@" --durations 15 --junitxml "$log.xml" \
     > "$log" 2>&1

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Helpers of the tests inside Blender."""
+"""Helper modules of the tests that run inside Blender."""

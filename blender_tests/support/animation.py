@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animates a face with keys on some controls and on the head."""
+"""Keys a few controls and the head bone of a face."""
 
 from . import scene
 
 
 def animate(rig, with_head=True):
-    """Insert keys on three controls and the head bone from frame 1 to 10. Returns the controls."""
+    """Key three controls and the head bone from frame 1 to 10; returns the control armature."""
     controls, bone = scene.controls(rig), scene.face(rig)
     for frame, jaw, pull, turn in ((1, 0.0, 1.0, 0.0), (5, 1.0, 0.2, 0.4), (10, 0.3, 0.6, -0.3)):
         for end, value in (("jawOpen", jaw), ("mouthCornerPullL", pull), ("eyeLookUpL", jaw)):

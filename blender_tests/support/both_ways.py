@@ -6,16 +6,16 @@ import numpy as np
 
 from . import scene
 
-NEAR = 1e-5  # tolerance as a share of the face's size
+NEAR = 1e-5  # tolerated distance, relative to the face's size
 
 
 def plan(rig):
-    """The conditions.Plan with which a face was last shown."""
+    """The last conditions.Plan of a face: which meshes have finished positions."""
     return scene.submodule("scene.skinning.conditions").known(rig)
 
 
 def is_direct(rig, *numbers):
-    """Whether these meshes of a face (or all) are in Direct mode, with disabled modifiers."""
+    """Whether some or all meshes of a face have finished positions and disabled modifiers."""
     items = scene.meshes(rig)
     wanted = [items[n] for n in numbers or items]
     off = all(not m.modifiers[0].show_viewport for m in wanted)
@@ -45,7 +45,7 @@ def normals(item):
 
 
 def bones(rig):
-    """The posed matrices of the deforming armature's bones, float64[B, 4, 4]."""
+    """float64[B, 4, 4]: posed matrices of the evaluated deforming armature's bones."""
     seen = rig.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones
     flat = np.empty(len(seen) * 16, np.float32)
     seen.foreach_get("matrix", flat)
@@ -53,16 +53,16 @@ def bones(rig):
 
 
 def settle():
-    """Update twice, so that Blender also evaluates the add-on's writes after an edit."""
+    """Let Blender evaluate edits, and then the values that the add-on wrote in response."""
     bpy.context.view_layer.update()
     bpy.context.view_layer.update()
 
 
 class Pair:
-    """The same face twice, in Direct mode and in Live mode.
+    """Two imports of a file at the same place, one in Direct mode and one in Live mode.
 
     Attributes:
-        direct, live: deforming armature of the face in Direct mode and in Live mode.
+        direct, live: deforming armatures of the face in Direct mode and of the face in Live mode.
     """
 
     def __init__(self, path, **options):
@@ -82,13 +82,13 @@ class Pair:
         settle()
 
     def edit(self, change):
-        """Make one edit on both faces. Args: change  function of a rig and its head mesh."""
+        """Make an edit of both faces. Args: change: function of the armature and the head mesh."""
         done = [change(rig, scene.meshes(rig)[0]) for rig in self.each()]
         settle()
         return done
 
     def apart(self, lod=0):
-        """The largest distance between the meshes, relative to their rigs, as a share of size."""
+        """Largest distance between both faces' vertices in armature space, over the face's size."""
         found = []
         for rig in self.each():
             place = np.linalg.inv(np.array(rig.matrix_world))
@@ -100,11 +100,11 @@ class Pair:
         return max(float(np.abs(a - b).max()) for a, b in pairs) / size
 
     def bones_apart(self):
-        """The largest difference between elements of posed bone matrices."""
+        """The largest difference between elements of both faces' posed bone matrices."""
         return float(np.abs(bones(self.direct) - bones(self.live)).max())
 
     def check(self, near=NEAR):
-        """Check that both faces show the same for two poses."""
+        """Assert that both faces have the same shape in two poses."""
         for values in ((0.9, 0.2), (0.3, 0.8)):
             self.set(jawOpen=values[0], mouthCornerPullL=values[1])
             assert self.apart() < near

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run code in a separate Blender: for other environments, and for code that may crash."""
+"""Runs code in a separate Blender process, with other environment variables or risk of a crash."""
 
 import os
 import sys
@@ -37,16 +37,16 @@ os._exit(code)
 
 
 def run(tmp_path, body, cpu=300, **environment):
-    """Run lines of Python with the names `bpy` and `scene` in a separate Blender.
+    """Run lines of Python that can use `bpy` and `scene`.
 
     Args:
         tmp_path: folder for the script.
-        body: lines of Python.
-        cpu: limit in seconds of CPU.
+        body: the lines.
+        cpu: limit of CPU time in seconds.
         environment: environment variables to set.
 
     Returns:
-        Exit code, and the printed output.
+        Exit code and printed text.
     """
     script = tmp_path / "child.py"
     indented = "\n".join(f"    {line}" for line in body.splitlines())

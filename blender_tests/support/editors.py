@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads and edits keys through Blender's own animation editors."""
+"""Runs operators in Blender's animation editors, and lists their visible F-curves."""
 
 from contextlib import contextmanager
 
@@ -8,7 +8,7 @@ import bpy
 
 @contextmanager
 def editor(kind):
-    """Let operators run in an editor during this context. Args: kind  its Area.type."""
+    """Context manager: operators run in an editor. Args: kind: a value of Area.type."""
     window = bpy.context.window_manager.windows[0]
     area = window.screen.areas[0]
     before, area.type = area.type, kind

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head in the form of an egg with shape keys, from which a rig can be made."""
+"""Makes an egg-shaped head with shape keys and without a rig, as input of a joint rig."""
 
 import importlib.util
 from pathlib import Path
@@ -16,7 +16,7 @@ _METRES = 0.01
 
 
 def egg():
-    """Add the egg as the active object, looking along -y, with the expressions' shape keys."""
+    """Add the head as active object; it faces -y and has keys of face_shapes.expressions."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new("Egg")
     mesh.from_pydata(_to_blender(positions).tolist(), [], faces.tolist())
@@ -33,5 +33,5 @@ def egg():
 
 
 def _to_blender(points):
-    """Convert centimetres with y up to metres with z up."""
+    """Convert points from centimetres with y up to metres with z up."""
     return np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1) * _METRES

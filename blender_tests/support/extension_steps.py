@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""One step in the life of an installed extension, in a Blender process of its own.
+"""Installs, uses, disables or removes the extension: one step per Blender process.
 
-    blender -b --python extension_steps.py -- STEP [ARGUMENTS] python extension_steps.py -- STEP
-    [ARGUMENTS]
+    blender -b --python extension_steps.py -- STEP [ARGUMENTS]
+    python extension_steps.py -- STEP [ARGUMENTS]
 
 It prints its result as one line of JSON after `RESULT `. An exception gives exit code 1.
 """
@@ -21,7 +21,7 @@ MODULE = "bl_ext.user_default.risorius"
 
 
 def of_ours():
-    """All parts of the add-on that are registered in this process."""
+    """The add-on's handlers, classes, operators, properties and menus in this process."""
     handlers = [
         name
         for name in dir(bpy.app.handlers)
@@ -47,7 +47,7 @@ def _list(value):
 
 
 def _manager():
-    """Enable the part of Blender that installs extensions, which the bpy module lacks at start."""
+    """Enable Blender's installer of extensions, which the bpy module does not enable."""
     import addon_utils
 
     if "bl_pkg" not in bpy.context.preferences.addons:
@@ -55,8 +55,8 @@ def _manager():
 
 
 def _read_preferences(step):
-    """The module bpy starts with factory settings. Before 4.5 it crashes when it reads the user's
-    settings, so the extension is enabled by hand there."""
+    """Read the user's preferences, because bpy starts with factory settings. bpy before 4.5 crashes
+    while reading them; there, the extension is enabled directly."""
     if bpy.app.version >= (4, 5, 0):
         bpy.ops.wm.read_userpref()
     elif step in ("use", "add", "disable", "remove"):
@@ -67,7 +67,7 @@ def _read_preferences(step):
 
 
 def install(package):
-    """Install like a user: Preferences, Install from Disk."""
+    """Install the package and enable it, as by Preferences > Install from Disk."""
     _manager()
     bpy.ops.extensions.package_install_files(
         filepath=package, repo="user_default", enable_on_install=True
@@ -83,7 +83,7 @@ def _vertices(item):
 
 
 def use(path):
-    """Import a face, move it, and save the scene in the same folder."""
+    """Import a face, move it, and save the scene in the folder of the DNA file."""
     assert bpy.ops.risorius.import_dna(filepath=path) == {"FINISHED"}
     rig = next(o for o in bpy.data.objects if "risorius_controls" in o)
     bone = rig["risorius_controls"].pose.bones["face"]
@@ -99,7 +99,7 @@ def use(path):
 
 
 def add(_nothing=""):
-    """Add > Face, without network access."""
+    """Add the sample face by Add > Face; fail if that starts another program."""
 
     def forbidden(*_arguments, **_options):
         raise AssertionError("the sample face needs another program")
@@ -124,7 +124,7 @@ def add(_nothing=""):
 
 
 def disable(_nothing=""):
-    """Disable like a user, with the check box in the preferences."""
+    """Disable the add-on, as by the check box in the preferences."""
     bpy.ops.preferences.addon_disable(module=MODULE)
     bpy.ops.wm.save_userpref()
     return of_ours()
@@ -139,7 +139,7 @@ def look(blend):
 
 
 def remove(_nothing=""):
-    """Uninstall like a user."""
+    """Uninstall the extension, as by Uninstall in the preferences."""
     _manager()
     names = [r.module for r in bpy.context.preferences.extensions.repos]
     bpy.ops.extensions.package_uninstall(repo_index=names.index("user_default"), pkg_id="risorius")

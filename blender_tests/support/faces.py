@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A small DNA like a face: two meshes, LODs, joints, channels, maps, odd names."""
+"""Makes small DNAs for tests: two meshes, LODs, joints, channels, maps and odd names."""
 
 import numpy as np
 import risorius
@@ -25,7 +25,7 @@ UNOWNED = 5
 
 
 def _grid(columns, rows, radius, center):
-    """A patch of a sphere that faces the file's front (+z): positions, normals, UVs and quads."""
+    """Positions and quads of a patch of a sphere that faces the file's front (+z)."""
     u, v = np.meshgrid(np.linspace(-1.2, 1.2, columns), np.linspace(-1.2, 1.2, rows))
     u, v = u.ravel(), v.ravel()
     unit = np.stack([np.sin(u) * np.cos(v), np.sin(v), np.cos(u) * np.cos(v)], axis=1)
@@ -77,7 +77,7 @@ def small_face(
     translation_unit="cm",
     head_grid=(12, 14),
 ):
-    """A DNA with all elements that the add-on builds; equal at every call."""
+    """A DNA with every kind of data that the add-on imports; equal at every call."""
     random = np.random.default_rng(7)
     dna = risorius.Dna()
     dna.name, dna.lod_count, dna.max_lod = name, 2, 0
@@ -123,7 +123,7 @@ def small_face(
 
 
 def _behave(dna, random, angle):
-    """Add behavior: a jaw with nine attributes, an eye that looks, a corrective, channels, maps."""
+    """Add joint groups of a jaw (nine attributes) and an eye, a corrective, channels and maps."""
     count = len(CONTROLS)
     jaw = random.uniform(-1, 1, (9, 3)).astype(np.float32)
     jaw[3:6] *= 25 * angle
@@ -167,7 +167,7 @@ def _behave(dna, random, angle):
 
 
 def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
-    """Change the index spaces of a face in place.
+    """Reorder, add or remove joints, controls, channels and maps of a face in place.
 
     Args:
         dna: a small_face.
@@ -193,7 +193,7 @@ def renumbered(dna, joints=None, controls=None, channels=None, maps=None):
 
 
 def _order(names, order):
-    """The new names, and the new index of each old name (-1: removed)."""
+    """New names, and the new index of each old one (-1: removed)."""
     where = np.full(len(names), -1)
     for new, old in enumerate(order):
         if not isinstance(old, str):
@@ -234,10 +234,10 @@ def _renumber_channels(dna, order):
 
 
 def _renumber_controls(dna, order):
-    """Controls that others read may move but must not be removed: browDownL and later may."""
+    """Reorder controls; only browDownL and later ones may be removed: no part reads them."""
     count = len(dna.raw_control_names)
     dna.raw_control_names, where = _order(dna.raw_control_names, order)
-    where = np.append(where, len(order))  # the one corrective comes after the controls
+    where = np.append(where, len(order))  # the corrective has the index after the controls
     _keep_rows(dna.animated_maps.conditionals, "input_indices", where)
     dna.animated_maps.lods = [len(dna.animated_maps.conditionals.input_indices)] * 2
     dna.gui_to_raw.output_indices = where[dna.gui_to_raw.output_indices]
@@ -274,7 +274,7 @@ def _renumber_joints(dna, order):
 
 
 def other_face(**options):
-    """A newer file of the small face: other indices everywhere, some elements removed, some new."""
+    """A newer version of the small face: other indices, with removed and new elements."""
     dna = renumbered(
         small_face(**options),
         joints=[0, "new_joint", 1, 2, 5, 4, 3],
@@ -283,14 +283,14 @@ def other_face(**options):
         maps=[1, "new_map", 0],
     )
     offsets = dna.neutral_joint_translations.copy()
-    offsets[2] += [0.5, 1.0, 0.0]  # the neck
+    offsets[2] += [0.5, 1.0, 0.0]  # an offset of the neck joint
     dna.neutral_joint_translations = offsets
     return dna
 
 
 TURNING = tuple(f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw")
 UP, SIDE = 1, 2  # poses of neck_face
-# Rotations of neck_01 and head for each pose, relative to rest, about their own axes.
+# Quaternions of neck_01 and head for each pose, relative to rest, in their own axes.
 NECK_POSES = (
     (0, 0, 0, 1, 0, 0, 0, 1),
     (0, 0, 0.0871557, 0.9961947, 0, 0, 0.2164396, 0.9762960),
@@ -299,7 +299,7 @@ NECK_POSES = (
 
 
 def neck_face(**options):
-    """The small face with a solver that repairs the neck when neck and head rotate.
+    """The small face with a solver that deforms it when neck and head turn.
 
     The raw controls of TURNING store rotations of joints. The solver poses NECK_POSES drive
     channels 4 and 5. The pose UP together with the open jaw fires a corrective, which drives

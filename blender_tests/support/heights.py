@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The height of a panel in lines, because a click must not move the lines below the pointer."""
+"""Counts the lines of a panel, for tests that a click does not move the lines below it."""
 
 from types import SimpleNamespace
 
@@ -40,7 +40,7 @@ class Lines:
 
 
 def lines_of(panel):
-    """The number of lines of a panel with all its subpanels open."""
+    """The number of lines of a panel with all its sections open."""
     layout = Lines()
     panel.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout.count

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Damaged DNA files, and valid files with unusual content.
+"""Makes broken DNA files, and valid files with odd content.
 
-Damaged files with indices out of range, joints in a circle or huge counts are made by editing
-bytes, because the library refuses to write them.
+Broken files have indices out of range, cycles of joints or huge counts. The library refuses to
+write them, so they are made by editing bytes.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ DATA = Path(__file__).resolve().parents[2] / "tests" / "data"
 
 
 def found_by_fuzzing():
-    """Paths of the files that the project's fuzzers found."""
+    """Paths of the stored .dna and .json files that the project's fuzzers found."""
     return [p for p in sorted((DATA / "fuzz").iterdir()) if p.suffix in {".dna", ".json"}]
 
 
@@ -38,14 +38,14 @@ def broken_on_purpose():
 
 
 def cut_short(content, count):
-    """Prefixes of a file, from no byte to all but one."""
+    """Yield up to `count` prefixes of a file, from no byte to all but one."""
     for length in np.unique(np.linspace(0, len(content) - 1, count).astype(int)):
         yield content[:length]
 
 
 def with_flipped_bytes(content, count, seed):
-    """A file with one to eight bytes changed at random places; fewer late than early, where the
-    counts and offsets are."""
+    """Yield `count` copies with one to eight random changes, mostly at the beginning, because the
+    counts and offsets are there."""
     random = np.random.default_rng(seed)
     for _ in range(count):
         changed = bytearray(content)
@@ -70,7 +70,7 @@ def _set(face, mesh=None, **values):
 
 
 def _numbers(face, value):
-    """Set some numbers of all geometry arrays to a value."""
+    """Set some numbers of every kind in the geometry to the same value."""
     meshes = list(face.meshes)
     for mesh in meshes:
         mesh.positions = _with(mesh.positions, value, np.s_[::5])
@@ -85,7 +85,7 @@ def _numbers(face, value):
 
 
 def _surface(face, value):
-    """Set some normals and UV coordinates, on which only the look depends, to a value."""
+    """Set numbers that affect only shading, such as normals and texture coordinates."""
     for mesh in range(len(face.meshes)):
         normals, uvs = face.meshes[mesh].normals, face.meshes[mesh].texture_coordinates
         _set(
@@ -105,7 +105,7 @@ def _neutral(face, value):
 
 
 def _named(face, text):
-    """Use one text as the name of every element."""
+    """Give all elements the same name."""
     face.name = text
     face.joint_names = [text] * len(JOINTS)
     face.raw_control_names = [text] * len(CONTROLS)
@@ -116,7 +116,7 @@ def _named(face, text):
 
 
 def _flat_faces(face):
-    """Faces with one corner, with two corners, and with one vertex at all corners."""
+    """Use polygons with one corner, with two, and with one vertex at all corners."""
     layouts = np.array([0, 1, 2, 5, 5, 5, 5, 6, 7, 6], np.uint32)
     for mesh in range(len(face.meshes)):
         _set(face, mesh, face_layouts=layouts, face_offsets=np.array([0, 1, 3, 7, 10], np.uint32))
@@ -159,7 +159,7 @@ def _no_skin(face):
 
 
 def _many_joints(face, count=5000):
-    """A long chain of joints, each a hundredth of a millimetre from its parent."""
+    """Add a long chain of joints, each 0.01 mm from its parent."""
     more = count - len(JOINTS)
     face.joint_names = [*JOINTS, *(f"tiny_{i}" for i in range(more))]
     face.joint_parents = np.array(
@@ -218,7 +218,7 @@ ODD = {
 
 
 def odd_face(name):
-    """The bytes of a small face with one unusual property."""
+    """The bytes of a small face with one change of ODD."""
     face = small_face()
     ODD[name](face)
     return face.to_bytes()

@@ -57,7 +57,7 @@ class Recorder:
         return lambda *_a, **_o: Recorder(self._top)
 
     def text(self, between=" "):
-        """All drawn texts as one line."""
+        """All drawn labels, joined."""
         return between.join(self.labels)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Make the files of the past with any build of the extension, and record their animation.
+"""Make .blend files with an old build of the extension, and record their animation.
 
     python blender_tests/support/make_past.py ZIP FOLDER [--record]
 
@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve()
 
 
 def _start(package):
-    """The extension, installed in a throw-away folder of this process."""
+    """Install the extension in a temporary user folder of this process."""
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="risorius-past-")
     import bpy
 

@@ -11,19 +11,19 @@ from types import SimpleNamespace
 import blf
 import bpy
 
-SIDEBAR = 280 - 20 - 16  # pixels: without the tabs at its edge and the panel's margins
+SIDEBAR = 280 - 20 - 16  # pixels: a sidebar without its tabs and the margins of a panel
 FILE_BROWSER = 240 - 16
 DIALOG = 300 - 24
-_MARGIN = 10  # around the text of a label; a button has more
+_MARGIN = 10  # pixels around the text of a label; a button has more
 _BUTTON = 14
 _ICON = 20
-_ASKED = 30  # pixels that a button adds to its text's width in a row; a label adds almost none
-_NUMBER = 60  # the same for a number
+_ASKED = 30  # pixels that a button requests from a row in addition to its text
+_NUMBER = 60  # the same for a number field
 _NAMES = 0.4
 _VALUE = "0.000"
 # Heights measured in a window of Blender 4.3, where they are larger than in 5.2.
 HEADER, SUB_HEADER, _LINE, EDGES = 28, 25, 21, 10
-# English -> text in the tested language, because the bpy module cannot translate.
+# English -> translation; replaces Blender's lookup, which the bpy module lacks.
 LOCAL = {}
 
 
@@ -35,17 +35,17 @@ def width_of(text):
 
 
 def local(text):
-    """A label in the tested language."""
+    """The translation of a label in LOCAL, or the label."""
     return LOCAL.get(text, text)
 
 
 class Part:
     """A row, a column or a split.
 
-    Its children are Parts and (text, pixels to be read, pixels that it asks a row for).
+    Its children are Parts and (text, pixels to show it fully, pixels that it requests from a row).
     """
 
-    everything_open = True  # False: subpanels are open as in a new file
+    everything_open = True  # False: nested panels have their default state
 
     def __init__(self, kind="column", factor=0.0, split=False):
         self.is_header = False
@@ -98,7 +98,7 @@ class Part:
         self.children.append((text, pixels, asked))
 
     def _named(self, text):
-        """Add a name in the left part of a line that is split into name and value."""
+        """Add a line that is split into a name at the left and a value."""
         part = self._inner("split", _NAMES)
         part._leaf(text, width_of(text) + _MARGIN)
         part._leaf("", 0)
@@ -166,7 +166,7 @@ class Part:
         elif self.use_property_split and self.kind != "row":
             self._named(text)
             self.children[-1].children[-1] = (text, pixels, pixels)
-        elif within:  # a number bears its name
+        elif within:  # the field of a number contains its name
             self._leaf(text, width_of(text) + pixels, width_of(text) + pixels + _NUMBER)
         else:
             part = self._inner("split", _NAMES)
@@ -174,19 +174,19 @@ class Part:
             part._leaf(text, pixels)
 
     def asks(self):
-        """The width in pixels that the part requests from a row."""
+        """Width in pixels that this part requests from a row."""
         asked = [c.asks() if isinstance(c, Part) else c[2] for c in self.children]
         return sum(asked) if self.kind == "row" else max(asked, default=0)
 
     def height(self):
-        """The height in pixels."""
+        """Height in pixels."""
         if self.is_header:
             return SUB_HEADER
         tall = [c.height() if isinstance(c, Part) else _LINE for c in self.children]
         return max(tall, default=0) if self.kind in ("row", "split") else sum(tall)
 
     def cut(self, width):
-        """The text cut off at a width, each with its needed and available width."""
+        """Texts that are cut off at a width in pixels, with needed and available pixels."""
         found = []
         for child, room in zip(self.children, self._rooms(width), strict=True):
             if isinstance(child, Part):
@@ -215,7 +215,7 @@ def _property(data, name):
 
 
 class Operator:
-    """An operator whose draw() is tested, with given or default properties."""
+    """A fake operator instance for draw(), with given or default property values."""
 
     def __init__(self, kind, **given):
         self._kind = kind
@@ -234,13 +234,13 @@ class Operator:
         return rule.default_array if getattr(rule, "is_array", False) else rule.default
 
     def draw(self, context):
-        """Call its draw(). Returns: the drawing."""
+        """Call the operator's draw(). Returns the drawn Part."""
         self._kind.draw(self, context)
         return self.layout
 
 
 def drawn(kind, context, **given):
-    """Draw a panel or a line of a list into a Part."""
+    """The Part that a panel or a line of a list draws."""
     layout = Part()
     kind.draw(SimpleNamespace(layout=layout, **given), context)
     return layout

@@ -13,7 +13,7 @@ _AXES = {
 
 
 def _rotation(dna, angles):
-    """The matrix of a joint's angles for column vectors; the sequence's first rotation is first."""
+    """Rotation matrix for column vectors; the first axis of the sequence acts first."""
     if dna.rotation_unit == "degrees":
         angles = np.radians(angles)
     matrix = np.eye(3)
@@ -31,7 +31,7 @@ def _rotation(dna, angles):
 
 
 def _world(dna, deltas, turns=None):
-    """Joint matrices in the file's space. Args: turns  see `vertices`."""
+    """World matrices of joints in the file's axes and units; turns: see `vertices`."""
     parents = dna.joint_parents
     result = []
     for joint, parent in enumerate(parents):
@@ -48,7 +48,7 @@ def _world(dna, deltas, turns=None):
 
 
 def to_blender(dna, points, unit_scale=1.0):
-    """Convert points of the file to Blender units."""
+    """Convert points from the file's axes and unit to Blender's."""
     axes = np.array([_AXES[w] for w in dna.coordinate_system], np.float64).T
     metres = 0.01 if dna.translation_unit == "cm" else 1.0
     return points @ axes.T * metres / unit_scale
@@ -58,11 +58,11 @@ def vertices(dna, mesh_index, pose, unit_scale=1.0, turns=None):
     """Deformed vertices of a mesh, float64[V, 3] in Blender units.
 
     Args:
-        dna: the Dna.
+        dna: the face.
         mesh_index: index of the mesh.
         pose: risorius.Pose.
         unit_scale: metres per Blender unit.
-        turns: joint -> rotation float64[3, 3] that Blender adds to its rest, about its own axes.
+        turns: joint -> float64[3, 3], additional rotation relative to rest, in the joint's axes.
     """
     mesh = dna.meshes[mesh_index]
     points = mesh.positions.astype(np.float64)

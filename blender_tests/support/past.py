@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of older versions: opens them in several ways and records their animation."""
+"""Opens .blend files of old versions in several ways and records their animation."""
 
 import json
 import os
@@ -13,7 +13,7 @@ DATA = Path(__file__).resolve().parents[1] / "data" / "past"
 FRAMES = (1.0, 4.5, 9.0, 14.0, 20.0, 31.0)
 AS_SAVED = "as saved"
 LIVE_AGAIN = "live again"
-# File -> preparation before playing: the name of an action to assign.
+# File -> ways to play it: as saved, unbaked (LIVE_AGAIN), or with the named action assigned.
 PLAYS = {
     "layers": (AS_SAVED, "Other"),
     "meta": (AS_SAVED,),
@@ -31,7 +31,7 @@ PLAYS = {
 
 @contextmanager
 def scalar():
-    """During this context faces are compiled for the scalar code, equal on every processor."""
+    """Context manager: faces use the scalar kernels, whose results are equal on every processor."""
     before = os.environ.get("RISORIUS_SIMD")
     os.environ["RISORIUS_SIMD"] = "scalar"
     try:
@@ -44,7 +44,7 @@ def scalar():
 
 
 def rigs():
-    """The deforming armatures of the scene, also linked ones, by name."""
+    """The deforming armatures of the scene, including linked ones, sorted by name."""
     found = [o for o in bpy.context.scene.objects if "risorius_controls" in o]
     return sorted(found, key=lambda o: o.name)
 
@@ -55,7 +55,7 @@ def controls():
 
 
 def open_it(path, _folder):
-    """Open a file. Blender 5.2 reports the repair of 4.2's override roots as an error."""
+    """Open the file; ignore the error of Blender 5.2 when it repairs override roots of 4.2."""
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path))
     except RuntimeError as error:
@@ -64,13 +64,13 @@ def open_it(path, _folder):
 
 
 def _open_if_needed(path, folder):
-    """Open a file unless it is open and unchanged, because opening takes most of the time."""
+    """Open the file unless it is open and unchanged, because opening takes most of the time."""
     if bpy.data.filepath != str(path) or "touched" in bpy.context.scene:
         open_it(path, folder)
 
 
 def save_and_open(path, folder):
-    """Open a file, save it under another name, and open that."""
+    """Open the file, save it under another name, and open the copy."""
     _open_if_needed(path, folder)
     again = folder / f"again_{path.name}"
     bpy.ops.wm.save_as_mainfile(filepath=str(again))
@@ -78,7 +78,7 @@ def save_and_open(path, folder):
 
 
 def append(path, _folder):
-    """Append the file's characters and actions to an empty file."""
+    """Append its characters and actions to an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path)) as (there, _here):
         collections, actions = list(there.collections), list(there.actions)
@@ -91,7 +91,7 @@ def append(path, _folder):
 
 
 def link(path, _folder):
-    """Link the file's characters and actions into an empty file."""
+    """Link its characters and actions into an empty file."""
     bpy.ops.wm.read_homefile(use_empty=True)
     with bpy.data.libraries.load(str(path), link=True) as (there, here):
         collections = list(there.collections)
@@ -102,7 +102,7 @@ def link(path, _folder):
 
 
 def override(path, folder):
-    """Link the file's characters and make them ready to animate."""
+    """Link its characters and make library overrides of them."""
     link(path, folder)
     for rig in rigs():
         bpy.context.view_layer.objects.active = rig["risorius_controls"]
@@ -111,7 +111,7 @@ def override(path, folder):
 
 
 def undo(path, folder):
-    """Open a file, change it, and undo the change."""
+    """Open the file, change it, and undo the change."""
     bpy.context.preferences.edit.use_global_undo = True
     _open_if_needed(path, folder)
     bpy.ops.ed.undo_push(message="as it was")
@@ -134,12 +134,12 @@ ROUTES = {
     "link": link,
     "override": override,
 }
-# Files with library overrides are not appended or linked again.
+# Routes that are skipped for files that already contain library overrides.
 NOT_OVERRIDDEN = ("append", "link", "override")
 
 
 def routes_of(name):
-    """The routes by which a file is brought into Blender."""
+    """The names in ROUTES by which a file is opened."""
     skipped = NOT_OVERRIDDEN if name.startswith("overridden") else ()
     return [route for route in ROUTES if route not in skipped]
 
@@ -160,7 +160,7 @@ def prepare(play):
         bpy.context.scene["touched"] = True
     for rig, item in [(r, r["risorius_controls"]) for r in rigs()]:
         if item.library is not None:
-            continue  # stays as it was saved
+            continue  # linked: its state in the library stays
         _choose_slot(item)
         if play == LIVE_AGAIN:
             bpy.context.view_layer.objects.active = item
@@ -202,7 +202,7 @@ def film(frames=FRAMES, read=None):
 
 
 def _read(rig, depsgraph):
-    """Bones, shape keys, channels and maps as Blender shows them."""
+    """Evaluated values of bones, shape keys, channels and maps."""
     seen = rig.evaluated_get(depsgraph)
     bones = seen.pose.bones
     found = {
@@ -240,7 +240,7 @@ def vertices(rig, depsgraph):
 
 
 def direct_rigs():
-    """The faces in Direct mode: at least one of their meshes has final positions."""
+    """The faces in Direct mode, which have at least one mesh with finished positions."""
     return [
         rig
         for rig in rigs()
@@ -260,9 +260,9 @@ def films(folder, name, work, routes=None):
 
     Args:
         folder: folder of the files.
-        name: name of a file in PLAYS.
-        work: folder for temporary files.
-        routes: some of ROUTES; None: all routes of the file.
+        name: a key of PLAYS.
+        work: folder for copies.
+        routes: keys of ROUTES; None: all routes of the file.
 
     Yields:
         "name/route/play" and its film.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head without expressions, and substitutes for parts of the package that use it."""
+"""A head without expressions, and fakes of the risorius functions that work on it."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ from . import scene
 from .egg import face_shapes
 
 METRES = 0.01
-# Landmarks of the formula's face, in centimetres with y up; the chin is not found.
+# Landmarks of the head of face_shapes, in cm with y up; the chin is missing on purpose.
 PLACES = {
     "eye_inner_L": (2.0, 3.0, 9.0),
     "eye_inner_R": (-2.0, 3.0, 9.0),
@@ -25,13 +25,13 @@ WORDS = {
 
 
 def to_blender(points):
-    """Convert centimetres with y up to metres with z up."""
+    """Convert points from centimetres with y up to metres with z up."""
     points = np.asarray(points, np.float64)
     return np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1) * METRES
 
 
 def plain_head(name="Egg"):
-    """Add a head without shape keys as the active object."""
+    """Add the head of face_shapes without shape keys as active object."""
     positions, faces = face_shapes.head()
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(to_blender(positions).tolist(), [], faces.tolist())
@@ -43,11 +43,11 @@ def plain_head(name="Egg"):
 
 
 class Package:
-    """Stands for the parts of the package that find landmarks and lay one head onto another.
+    """Replaces the functions of risorius that find landmarks and register heads.
 
     Attributes:
-        places: the landmarks that are found, in centimetres.
-        heads: the finding.Head of each call, in their order.
+        places: name -> landmark that the fake finds, in centimetres.
+        heads: the finding.Head of each call.
     """
 
     def __init__(self, monkeypatch):
@@ -64,16 +64,16 @@ class Package:
 
 
 def opened(positions):
-    """Displacements that open the mouth: the lower half moves down by 1 cm."""
+    """Displacements of the fake jawOpen: the lower half of the head moves down by 1 cm."""
     low = positions[:, 1] < positions[:, 1].mean()
     return low[:, None] * np.array([0.0, -1.0, 0.0])
 
 
 class Onto(Package):
-    """Carries one expression over, gives a face back as it was, and keeps what it was asked.
+    """Also replaces the transfer, with one expression, and records its arguments.
 
     Attributes:
-        asked: what each call was given.
+        asked: arguments of each call.
     """
 
     def __init__(self, monkeypatch):

@@ -15,7 +15,7 @@ class Probe(bpy.types.RenderEngine):
     bl_use_preview = False
 
     seen = {}  # frame -> {mesh index: float64[V, 3] in world space}
-    between = ()  # offsets from each frame at which vertices are also recorded
+    between = ()  # offsets in frames at which it also records
 
     def render(self, depsgraph):
         frame = depsgraph.scene_eval.frame_current

@@ -4,10 +4,11 @@
 readers.py KIND FILE prints one JSON object. It runs in a process of its own, because Blender's and
 the package's copies of OpenUSD or Alembic may conflict in one process.
 
-    meshes   name -> points [V][3] at rest, material, colors [V][4] where it has a picture
-    names    all other things of the file: armatures, bones, shape keys, takes
-    opaque   materials -> whether nothing shines through begin, end   seconds of the animation up,
-    metres   axis, metres in a unit
+    meshes       name -> points [V][3] at rest, material, colors [V][4] if it has a texture
+    names        names of all other elements: armatures, bones, shape keys, takes
+    opaque       material -> whether it is opaque
+    begin, end   range of the animation in seconds
+    up, metres   up axis, and metres per unit
 """
 
 import base64
@@ -22,7 +23,7 @@ import numpy as np
 
 
 def _colors(picture, uvs):
-    """Colours of a picture at UV coordinates with v upwards, float[V, 4]."""
+    """float[V, 4] colours of a picture at UV coordinates; v increases upwards."""
     from PIL import Image
 
     with Image.open(picture) as image:
@@ -70,7 +71,7 @@ def _tree(content):
 
 
 def fbx(path):
-    """Read an FBX with Assimp's program, which writes its content as JSON."""
+    """Read an FBX file with Assimp's command, which exports its contents as JSON."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "told.json"
         command = ["assimp", "export", str(path), str(told), "-fassjson"]

@@ -10,7 +10,7 @@ import risorius
 from . import oracle
 
 MODULE = "bl_ext.user_default.risorius"
-TOLERANCE = 1e-4  # of the head's size: float32 of Blender and bone axes kept as a roll angle
+TOLERANCE = 1e-4  # relative to the head's size, for float32 and bone axes stored as a roll
 
 
 def submodule(name):
@@ -28,18 +28,18 @@ def load(path, mode="AUTO", **options):
 
 
 def add_board(kind="COMPLETE"):
-    """Add a board to the active face and return to object mode."""
+    """Add a board to the active face, and return to object mode."""
     assert bpy.ops.risorius.add_board(kind=kind) == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def controls(rig):
-    """The control armature."""
+    """The control armature of a deforming armature."""
     return rig["risorius_controls"]
 
 
 def face(rig):
-    """The bone with the sliders."""
+    """The pose bone whose custom properties are the sliders."""
     return controls(rig).pose.bones["face"]
 
 
@@ -50,14 +50,14 @@ def meshes(rig):
 
 
 def update(*items):
-    """Tag objects and evaluate the scene."""
+    """Tag objects as changed and evaluate the view layer."""
     for item in items:
         item.update_tag()
     bpy.context.view_layer.update()
 
 
 def set_controls(rig, **values):
-    """Set sliders by the ends of their names, and update."""
+    """Set sliders, named by the ends of their names, and evaluate the scene."""
     bone = face(rig)
     for end, value in values.items():
         name = next(k for k in bone.keys() if k.endswith(end))  # noqa: SIM118
@@ -77,15 +77,15 @@ def evaluated(item):
 
 
 def raw_of(rig, path):
-    """The raw controls from the current values of the sliders, float32[R]."""
+    """float32[R]: the raw control values of the sliders."""
     labels = submodule("logic.base.names").unique_labels(risorius.load(str(path)).raw_control_names)
     return np.array([float(face(rig)[n]) for n in labels], np.float32)
 
 
 def error_against_oracle(rig, path, raw, lod=0, unit_scale=1.0):
-    """The largest distance of Blender's vertices from the oracle's, as a share of the mesh's size.
+    """Largest distance between Blender's vertices and the oracle's, relative to the mesh's size.
 
-    The face may be at any place.
+    The transform of the armature may be arbitrary.
     """
     place = np.array(rig.matrix_world)
     dna = risorius.load(str(path))
@@ -110,7 +110,7 @@ def curves(item):
 
 
 def pose_bones(rig):
-    """Take a face out of Direct mode, so that the bones of its deforming armature are posed."""
+    """Switch a face from Direct to Live mode, so that its deforming armature has posed bones."""
     rig["risorius_skinning"] = "LIVE"
     update(controls(rig))
 
@@ -121,11 +121,11 @@ def snapshot(rig):
 
 
 def counts():
-    """The number of datablocks of every kind."""
+    """Kind of datablock -> number in the file."""
     return {
         p.identifier: len(getattr(bpy.data, p.identifier))
         for p in bpy.data.bl_rna.properties
-        if p.type == "COLLECTION" and p.identifier != "all_ids"  # since 5.2, all others together
+        if p.type == "COLLECTION" and p.identifier != "all_ids"  # since 5.2, contains all others
     }
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Random actions of a user on faces, and the conditions that must hold after each."""
+"""Random user actions on faces, and the checks after each action."""
 
 import hashlib
 import random
@@ -21,7 +21,7 @@ class WrongFaceError(AssertionError):
 
 
 class World:
-    """Random actions on the open file. Objects are looked up anew for each action, never stored."""
+    """Random actions on the open file. It stores no Blender objects, because undo replaces them."""
 
     def __init__(self, folder, seed, characters):
         self.folder, self.seed, self.characters = folder, seed, characters
@@ -29,7 +29,7 @@ class World:
         self.library = folder / "library.blend"
         self.random = random.Random(seed)
         self.sources, self._oracles = [], {}
-        self.repaired = 0  # overrides that Blender locked and the panel's button unlocked
+        self.repaired = 0  # number of locked overrides that the panel's button unlocked
         for number, axes in enumerate((("right", "up", "front"), ("left", "up", "back"))):
             path = folder / f"Face{number}.dna"
             faces.small_face(name=f"Face{number}", axes=axes).save(str(path))
@@ -41,7 +41,7 @@ class World:
     # -- the file ---------------------------------------------------------------------------
 
     def begin(self):
-        """Make an empty file with undo, a library with a character, and the first characters."""
+        """Save a library with a character, then an undoable file with the first characters."""
         self._enable()
         bpy.ops.wm.read_homefile(use_empty=True)
         self._import("LIVE" if self.random.random() < 0.5 else "KEYS")
@@ -50,7 +50,7 @@ class World:
         while len(self.rigs()) < self.characters:
             self._import("AUTO")
         self._settings()
-        self.render()  # the engine's allocations at its first render are no growth
+        self.render()  # memory that the engine keeps after its first render is no leak
         bpy.ops.ed.undo_push(message="begin")
         bpy.ops.wm.save_as_mainfile(filepath=str(self.blend))
 
@@ -66,7 +66,7 @@ class World:
 
     @staticmethod
     def rigs():
-        """Deforming armatures in the scene without linked ones, sorted by name."""
+        """Local deforming armatures of the scene, sorted by name."""
         inside = bpy.context.scene.objects
         found = [o for o in inside if o.library is None and o.get("risorius_controls")]
         return sorted(found, key=lambda o: o.name)
@@ -76,7 +76,7 @@ class World:
 
     @staticmethod
     def _meshes(rig):
-        """DNA mesh index -> mesh of this rig; copies may point to meshes of another rig."""
+        """DNA mesh index -> mesh of this rig; partial copies also refer to other rigs' meshes."""
         held = [rig[k] for k in rig.keys() if k.startswith("risorius_mesh_")]  # noqa: SIM118
         own = [m for m in held if m is not None and m.get("risorius_rig") == rig]
         return {m["dna_mesh"]: m for m in own}
@@ -143,7 +143,7 @@ class World:
         bpy.ops.risorius.set_lod_by_distance(enable=self.random.random() < 0.5)
 
     def place(self):
-        """Move, turn and scale the control armature."""
+        """Move, rotate and scale the control armature."""
         controls = self._rig()["risorius_controls"]
         controls.location = [self.random.uniform(-1, 1) for _ in range(3)]
         controls.rotation_euler = [self.random.uniform(-1, 1) for _ in range(3)]
@@ -151,7 +151,7 @@ class World:
         scene.update(controls)
 
     def attach(self):
-        """Attach a face to a body, or detach it, and move the body."""
+        """Attach a face to a body or detach it, then move the body."""
         rig = self._rig()
         self._activate(rig)
         body = bpy.context.scene.objects.get("body") or self._body()
@@ -175,7 +175,7 @@ class World:
         return body
 
     def test_channel(self):
-        """Test a channel; the user, a change of the frame or of a control ends the test."""
+        """Test a shape, then end the test by the operator or by a change of the frame."""
         self._activate(self._rig())
         bpy.ops.risorius.test_channel(channel="1", value=self.random.random())
         if self.random.random() < 0.5:
@@ -245,13 +245,13 @@ class World:
         objects = self._objects(self._rig())
         for item in objects:
             item.hide_viewport = False
-        layer.update()  # what was hidden until now cannot be selected before
+        layer.update()  # objects hidden until now cannot be selected before this
         for item in objects:
             item.hide_set(False)
             item.select_set(True)
         bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
         layer.update()
-        for rig in self.rigs():  # levels that were hidden are hidden again
+        for rig in self.rigs():  # hides the meshes of other LODs again
             scene.submodule("scene.lod.lods").show(rig)
         layer.update()
 
@@ -260,7 +260,7 @@ class World:
             self._delete(self._rig())
 
     def _delete(self, rig):
-        """Delete a face like a user: its objects, with their data, or the whole collection."""
+        """Delete a rig: by the operator, with its data, or with its override's collection."""
         objects = self._objects(rig)
         controls = rig["risorius_controls"]
         if any(r != rig and r["risorius_controls"] == controls for r in self.rigs()):
@@ -279,7 +279,7 @@ class World:
         bpy.context.view_layer.update()
 
     def delete_part(self):
-        """Delete a part, play frames, and undo the deletion."""
+        """Delete an object of a rig, change the frame, and undo."""
         self._push("whole")
         item = self.random.choice(self._objects(self._rig()))
         bpy.data.objects.remove(item)
@@ -287,7 +287,7 @@ class World:
         self.frame()
         self._push("ruin")
         bpy.ops.ed.undo()
-        bpy.context.view_layer.update()  # the step that follows makes the ruin unreachable
+        bpy.context.view_layer.update()  # the next undo step makes the broken state unreachable
 
     def _import(self, mode=None):
         path = self.random.choice(self.sources)
@@ -308,7 +308,7 @@ class World:
             bpy.ops.risorius.reload()
 
     def replace(self):
-        """Replace the file by the same one, or by one with other axes and shapes."""
+        """Replace the DNA of a rig by the same file, or by one with other axes and shapes."""
         rig = self._rig()
         if not rig.override_library:
             self._activate(rig)
@@ -373,7 +373,7 @@ class World:
         bpy.ops.outliner.orphans_purge(do_recursive=True)
 
     def other_scene(self):
-        """Open another scene for a while: an empty one, or one with the same characters."""
+        """Visit another scene, either empty or with the same characters."""
         here = bpy.context.window.scene
         there = bpy.data.scenes.new("there")
         if self.random.random() < 0.5:
@@ -415,13 +415,13 @@ class World:
     # -- conditions that must hold ----------------------------------------------------------
 
     def check(self):
-        """Compare every face of the scene with the oracle, and check every driver.
+        """Compare every face of the scene with the oracle, and check all drivers.
 
         Returns:
-            The largest error, of a mesh's size.
+            The largest error, relative to the mesh's size.
 
         Raises:
-            WrongFaceError: names the error and its size.
+            WrongFaceError: a driver is invalid, or a face differs by more than TOLERANCE.
         """
         bad, _ = scene.invalid_drivers()
         if bad:
@@ -465,7 +465,7 @@ class World:
         return worst
 
     def calm(self):
-        """Restore the number of characters at the start and reload the file, for samples."""
+        """Restore the initial number of characters, save and reload, before a memory sample."""
         while len(self.rigs()) > self.characters:
             self._delete(self.rigs()[-1])
         while len(self.rigs()) < self.characters:
@@ -479,12 +479,12 @@ class World:
     def leftovers(self):
         """Datablocks left after deleting every character; their number must not grow.
 
-        The file is opened again after it.
+        Opens the file again afterwards.
         """
         for rig in self.rigs():
             self._delete(rig)
         self.purge_all()
-        bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "empty.blend"))  # drops the dead
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "empty.blend"))  # drops unused data
         self.purge_all()
         # Linked data is not counted: parts that point to each other stay until the file is loaded.
         kinds = [p for p in bpy.data.bl_rna.properties if p.type == "COLLECTION"]
@@ -493,7 +493,7 @@ class World:
             for p in kinds
             if p.identifier != "libraries"
         }
-        # Reports are Texts for the user, which may stay.
+        # Reports are Texts that stay for the user.
         local["texts"] = [t for t in local["texts"] if "risorius_bytes" in t]
         counts = {name: len(found) for name, found in local.items()}
         bpy.ops.wm.open_mainfile(filepath=str(self.blend))
@@ -507,7 +507,7 @@ class World:
         self.purge()
 
 
-# Action -> weight; actions that change the file are undo steps.
+# Action -> relative frequency; actions that change the file are undo steps.
 WEIGHTS = {
     "slider": 300, "frame": 130, "key": 60, "undo": 80, "redo": 50, "select": 60, "lod": 50,
     "shape_mode": 40, "reset": 20, "overdrive": 20, "own_key": 20, "drop_own_key": 20,

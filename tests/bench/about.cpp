@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The build's facts for benchmarks, in a separate file because every commit recompiles it.
+// A separate file, because it contains the commit and is recompiled after every commit.
 #include "bench/machine.h"
 
 namespace risorius::bench {

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""What the repair leaves of what transfer breaks: lids, lips, skin in teeth, torn skin.
+"""Measures the faults of transferred expressions before and after their repair.
 
     python tests/bench/any_head_contact.py HEAD.obj... [--template FACE.dna] [--deepest 3]
 
-Each head gets the template's expressions without a click, and these are repaired. A row before and
-a row after, with the worst of all expressions and correctives: *gap*, the widest place at which a
-blink shows the eye, between the lids by rays from the eye's middle; *seen*, how much of an eye five
-people in front of the face see at both blinks (rays of their own, which know nothing of lids);
-*cut*, how deep the outside of lids lies in the eye; *lips*, the widest gap and the deepest cut of
-lips with an open jaw and all that closes the mouth; *teeth*, mm3 of skin in teeth and gums beyond
-rest as SkinChecker counts it, the sum of the widest `--deepest` expressions; *torn*, polygons of
-more than 2.5 times their area, all expressions together.
+Each head gets the template's expressions with automatic landmarks, and they are repaired. Two rows
+per head, before and after the repair, over all expressions and correctives:
+*gap*: the widest gap between closed lids, by rays from the eye's centre;
+*seen*: the largest visible area of an eye with both blinks, over five views of the face;
+*cut*: the greatest depth of the outer lids in the eye;
+*lips*, *lips in*: the widest gap and the deepest cut of the lips in the pose that closes the mouth
+of an open jaw;
+*teeth*: volume of skin in teeth and gums beyond rest, measured by SkinChecker, summed over the
+`--deepest` expressions with the largest volume;
+*torn*: polygons of more than 2.5 times their area, summed over all expressions.
 """
 
 from __future__ import annotations
@@ -37,13 +39,13 @@ from risorius.anyhead.transfer.template import read_template
 from risorius.anyhead.transfer.transfer import TransferOptions, transfer
 from risorius.base.errors import RisoriusError
 
-VIEWS = ((0, 0), (-25, 0), (25, 0), (0, 15), (0, -15))  # degrees aside and up
+VIEWS = ((0, 0), (-25, 0), (25, 0), (0, 15), (0, -15))  # degrees to the side and up
 PIXEL = 0.02  # cm
 HEADS = ("head", "gap mm", "seen mm2", "cut mm", "lips mm", "lips in mm", "teeth mm3", "torn")
 
 
 def seen_of_eyes(skin, triangles, eyes):
-    """The visible area of the eyes in mm2, from the view of VIEWS with the largest area."""
+    """The largest visible area of a single eye in mm2, over all eyes and all VIEWS."""
     worst = 0.0
     for aside, up in VIEWS:
         a, u = np.radians(aside), np.radians(up)
@@ -70,7 +72,7 @@ def blinks(ways):
 
 
 def row_of(target, fitted, singles, pairs, work, contacts, bodies, most):
-    """The worst value of each kind of fault."""
+    """The values of one table row, in the order of HEADS."""
     poses = {(name,): way for name, way in singles.items()} | pairs
     faults = {pose: work.faults(pose, way) for pose, way in poses.items()}
     closing = set(closing_pose(singles, pairs))

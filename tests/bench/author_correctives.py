@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""What correctives that are found by themselves mend, by how many there are, and what they undo.
+"""Measures how many faults automatically found correctives repair, and their side effects.
 
     risorius sample build man.dna --joints 0
     python tests/bench/author_correctives.py man.dna [--counts 100 300 500 1000]
     python tests/bench/author_correctives.py full_man.dna --built man.dna
 
-Looks at all pairs of expressions that move some vertices together and are no opposites, repairs
-them and measures each pair again with its corrective; of fewer correctives those that the search
-would make. *Bound*: no choice of so many of these pairs, were they mended wholly, takes more off of
-the total that falls least. *Undone*: of vertices that are moved
-by 0.5 mm at least and have no fault of their own, those that keep less than nine tenths of the
-linear sum's motion. *Worse*: pairs in which anything is deeper by 0.1 mm, or a face by 1 % larger
-beyond 2.5 times, than without. *Held out*: the correctives that the face has are taken away, and
-the search repairs their pairs: how far what it makes is from what was given. *Built*: the same
-totals in a finished face of joints and shapes, with all its correctives and with those alone that
-the face has from which it was made.
+Measures the faults of all pairs of expressions that move common vertices and are no opposites,
+repairs the pairs, and measures them again with their correctives, for several numbers of
+correctives.
+
+*Bound*: the fraction by which the three totals (volume, torn, folded) can all fall at most if this
+number of pairs is repaired completely.
+*Undone*: vertices without a fault that the linear sum moves by more than 0.5 mm, and that keep
+less than 0.9 of this motion with the corrective.
+*Worse*: pairs whose greatest depth grows by more than 0.1 mm with the corrective, or whose most
+stretched polygon grows by more than 1 % and beyond 2.5 times its area.
+*Held out* (--held-out): removes the face's own correctives, repairs their pairs, and measures the
+distance of the result from the removed correctives.
+*Built* (--built): the totals of a finished face of joints and shapes, with all its correctives and
+with only the correctives of its source.
 """
 
 from __future__ import annotations
@@ -40,7 +44,7 @@ TORN = 2.5
 
 
 def corners_of(mesh):
-    """The vertices of all corners, and the polygon of each corner."""
+    """The vertex and the polygon of each polygon corner of a mesh, as two integer arrays."""
     layouts = np.asarray(mesh.layout_positions, np.int64)
     corners = layouts[np.asarray(mesh.face_layouts, np.int64)]
     faces = np.repeat(np.arange(len(mesh.face_offsets) - 1), np.diff(mesh.face_offsets))
@@ -48,13 +52,13 @@ def corners_of(mesh):
 
 
 def undone(search, on, mesh):
-    """How many vertices a corrective holds back that have no fault: (looked at, held back, those of
-    them further than REACH_MM from a fault, those that it changes at all).
+    """Numbers of moving vertices without a fault: (all; held back: keeping less than KEPT of their
+    motion; held back and over REACH_MM from a fault; changed by over 0.01 mm).
 
     Args:
-        search: has repaired the pair.
-        on: the pair.
-        mesh: the skin.
+        search: the search, after it has repaired the pair.
+        on: indices of the pair's controls.
+        mesh: the skin mesh.
     """
     neutral = search.poser.neutral[0]
     linear = search.poser.pose(on, corrected=False)[0]
@@ -82,8 +86,8 @@ def worse(search, on):
     """Whether a pair's faults are worse with its corrective.
 
     Args:
-        search: the search, which has repaired the pair.
-        on: the pair.
+        search: the search, after it has repaired the pair.
+        on: indices of the pair's controls.
     """
     solids = search.poser.pose(on)[1:]
     a = search.checker.look(search.poser.pose(on, corrected=False)[0], solids)
@@ -91,11 +95,11 @@ def worse(search, on):
 
 
 def grew(a, b):
-    """Whether the deepest place or the most stretched face of b is worse than that of a.
+    """Whether the greatest depth of b exceeds that in a by 0.1 mm, or its largest stretch by 1 %.
 
     Args:
-        a: faults of a skin.
-        b: other faults of the same skin.
+        a: faults of a skin without a corrective.
+        b: faults of the same skin with the corrective.
     """
     deeper = np.asarray(b.depth).max() > np.asarray(a.depth).max() + 0.1
     larger = np.asarray(b.stretch).max() > max(TORN, 1.01 * np.asarray(a.stretch).max())
@@ -103,10 +107,10 @@ def grew(a, b):
 
 
 def held_out(dna):
-    """Lines: pairs that the face has correctives of, as these make them and as the search does.
+    """Lines of text: the distances between the face's own pair correctives and the found ones.
 
     Args:
-        dna: the face.
+        dna: a face with correctives.
     """
     bare = copy.copy(dna)
     bare.psds = risorius.Psds(rows=[], columns=[], values=np.zeros(0, np.float32))
@@ -138,11 +142,11 @@ def held_out(dna):
 
 
 def built(dna, source):
-    """A line: what is wrong in all pairs of a finished face, without and with what was found.
+    """A line of text: the faults of all pairs of a face without and with its found correctives.
 
     Args:
-        dna: a face of joints and shapes, whose coarsest level is one that both have.
-        source: what it was made from: its correctives are at work in both.
+        dna: a finished face of joints and shapes, loaded with the LODs of source.
+        source: the face from which it was made; its correctives are active in both measurements.
     """
     kept = sorted(sk.psd_parts(source))
     parts, plain = dna.psds, copy.copy(dna)
@@ -175,11 +179,11 @@ def built(dna, source):
 
 
 def far_moved(dna):
-    """float64[correctives]: how far each moves a vertex of the head, in mm, with its controls at 1
-    and the correctives of fewer of them at work.
+    """float64[correctives]: the largest displacement in mm that each corrective adds to the head,
+    with its controls at 1 and the correctives of subsets of these controls active.
 
     Args:
-        dna: a face of any joints and shapes.
+        dna: a face with joints, shapes or both.
     """
     columns = sk.column_count(dna)
     head = max(dna.meshes, key=lambda mesh: len(mesh.positions))
@@ -202,14 +206,14 @@ def far_moved(dna):
 
 
 def bound(values, count):
-    """The share of each total that `count` pairs can have at most, of the one they have least of.
+    """An upper bound, 0 to 1, of the smallest of the three fractions that `count` pairs remove.
 
-    By duality: the least of three shares is no larger than any weighted mean of them, and of that
-    the pairs that are largest in it have most.
+    By duality: the smallest of three fractions is at most any weighted mean of them, and the pairs
+    with the largest values maximise that mean. The smallest result of 861 weightings is returned.
 
     Args:
-        values: float64[pairs, 3].
-        count: of pairs.
+        values: float64[pairs, 3], volume, torn and folded of each pair.
+        count: number of repaired pairs.
     """
     shares, steps = values / values.sum(axis=0), 40
     grid = [(a, b, steps - a - b) for a in range(steps + 1) for b in range(steps + 1 - a)]

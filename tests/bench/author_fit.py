@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Fits of joints to the CC0 head's 52 expressions, beside Dem Bones where it is installed.
+"""Measures errors and times of fitting joints to expressions, and of Dem Bones with --rival.
 
-python tests/bench/author_fit.py --joints 40 120 400 [--rival] [--bound] [--heads HEAD ...]
-The rival is EA's own code: pip install py-dem-bones==0.13.1. Both get the same mesh, joints and
-influences; the seconds are wall and CPU. Heads are cc0, those of MACROS, which no sample person has
-(the units of the data as they are, on another form), and the path of ICT FaceKit's head as an .npz.
+    python tests/bench/author_fit.py --joints 40 120 400 [--rival] [--bound] [--heads HEAD ...]
+
+Dem Bones is EA's library: pip install py-dem-bones==0.13.1. Both get the same mesh, number of
+joints and influences. HEAD is cc0 (the CC0 head with its expressions), a name of MACROS (the same
+expressions on a body shape that no sample person has), or the path of ICT FaceKit's head as .npz.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ MACROS = {
 
 
 def head(path, macros=()):
-    """Positions, displacements [E, V, 3] and polygons of the head, in decimetres."""
+    """(positions [V, 3], displacements [E, V, 3], polygons) of the CC0 head, in decimetres."""
     source = Source(path)
     base = source.base_mesh()
     names = zipfile.ZipFile(path).namelist()
@@ -54,7 +55,7 @@ def head(path, macros=()):
 
 
 def ict(path):
-    """As head, of ICT FaceKit's head with mouth, teeth and eyes."""
+    """(positions, displacements, polygons) of ICT FaceKit's head with mouth, teeth and eyes."""
     with np.load(path) as data:
         neutral, begin = data["neutral"].astype(float), data["expression_begin"]
         moved = np.zeros((len(begin) - 1, *neutral.shape))
@@ -75,7 +76,7 @@ def edges_of(faces):
 
 
 def roughness(weights, edges):
-    """Mean over vertices of the summed differences to the mean of the neighbours' weights."""
+    """Mean over vertices of the L1 distance between a vertex's weights and its neighbours' mean."""
     mean = np.zeros_like(weights)
     np.add.at(mean, edges[:, 0], weights[edges[:, 1]])
     np.add.at(mean, edges[:, 1], weights[edges[:, 0]])
@@ -100,7 +101,7 @@ def row(name, positions, moved, reached, weights, edges, wall, cpu):
 
 def ours(joints, positions, moved, edges, bound):
     rest = np.tile(np.eye(3, 4), (len(moved), 1, 1, 1))
-    options = FitOptions(joints=joints - 1)  # the resting one is a joint too
+    options = FitOptions(joints=joints - 1)  # the given joint at rest counts too
     begin, cpu = time.perf_counter(), time.process_time()
     fit = fit_joints(
         positions,

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Frames per second of a batch on each core, beside those of evaluating one frame after the other.
+"""Measures frames per second and core of `risorius batch`, relative to single evaluations.
 
     python tests/bench/batch_throughput.py CHARACTER.dna [--clips 80] [--frames 3600] [--lod 0]
 
-Clips by formula: a third of the controls move, as sines of their own speeds, 60 frames a second.
-Rows of a bake take one clip in this process; rows of a batch take all (those with files a tenth),
-start of processes and reading of clips included. CPU time is that of all processes, so it is a
-core's; on a machine that does other things too, compare it and not the wall time.
+In the generated clips a third of the controls move as sines of different speeds, at 60 frames per
+second. Rows of a bake evaluate one clip in this process. Rows of a batch evaluate all clips, or a
+tenth of them if files are written, and include the start of processes and the reading of clips. CPU
+time is summed over all processes, so frames per CPU second are the speed of one core. On a busy
+machine compare CPU times and not wall times.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ PARTS = ("joints", "shapes", "maps")
 
 
 def about() -> str:
-    """CPU and commit, for the head of the table."""
+    """Line of text above the table: CPU, version of Python, and commit."""
     cpu = platform.processor()
     info = Path("/proc/cpuinfo")
     if info.is_file():
@@ -56,7 +57,7 @@ def make_clip(names: list[str], frames: int, seed: int) -> risorius.Clip:
 
 
 class Clock:
-    """Seconds on the wall and on processors, of this process and of those it has waited for."""
+    """Measures wall and CPU seconds of this process and its finished child processes."""
 
     def __enter__(self) -> Clock:
         self._wall, self._cpu = time.perf_counter(), self._spent()
@@ -71,7 +72,7 @@ class Clock:
 
 
 class Table:
-    """Rows of frames per second; the first is what the others are compared with."""
+    """Prints rows of frames per second, each with its ratio to the first row."""
 
     def __init__(self) -> None:
         self._alone = 0.0
@@ -85,7 +86,7 @@ class Table:
 
 
 def single(clip: risorius.Clip, face: Face, lod: int) -> Clock:
-    """Rig.evaluate, frame by frame."""
+    """Time of Rig.evaluate, frame by frame."""
     raw, _ = clip.raw_controls(face.rig.raw_control_names)
     with Clock() as clock:
         for frame in raw:
@@ -94,7 +95,7 @@ def single(clip: risorius.Clip, face: Face, lod: int) -> Clock:
 
 
 def in_chunks(clip: risorius.Clip, face: Face, lod: int) -> Clock:
-    """evaluate_batch on one core, poses thrown away."""
+    """Time of evaluate_batch on one core without keeping the poses."""
     with Clock() as clock:
         for _ in played(clip, face, lod):
             pass
@@ -102,7 +103,7 @@ def in_chunks(clip: risorius.Clip, face: Face, lod: int) -> Clock:
 
 
 def bakes(table: Table, clip: risorius.Clip, face: Face, lod: int, folder: Path) -> None:
-    """What each kind of output adds to the evaluation, in this process."""
+    """Measure a bake in this process without files, and with each kind of output file."""
     for kind, compress in (("", False), ("npz", False), ("npz", True), ("csv", False)):
         path = folder / f"out.{kind}"
         with Clock() as clock:
@@ -113,7 +114,7 @@ def bakes(table: Table, clip: risorius.Clip, face: Face, lod: int, folder: Path)
 
 
 def batches(table: Table, dna: Path, lod: int, folder: Path) -> None:
-    """Whole batches; a tenth of the clips where files are written."""
+    """Measure batches with one and all workers; a tenth of the clips if files are written."""
     for write, pattern in (("", "*"), ("npz", "*0")):
         for workers in sorted({1, default_workers()}):
             jobs = folder / f"jobs{write}{workers}.toml"
@@ -131,7 +132,7 @@ def batches(table: Table, dna: Path, lod: int, folder: Path) -> None:
 
 
 def shares(summary: Path) -> str:
-    """Of the time that jobs took in their workers: reading, evaluating, the rest."""
+    """Text: percentages of the jobs' time for reading, for evaluating, and for the rest."""
     rows = json.loads(summary.read_text())["jobs"]
     total = sum(row["job_seconds"] for row in rows)
     load = sum(row["load_seconds"] for row in rows) / total

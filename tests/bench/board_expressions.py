@@ -3,10 +3,10 @@
 
     python tests/bench/board_expressions.py man.dna
 
-The handles are where a click on the expression brings them (least squares over the sliders); what
-they do not lead to is at rest. Of each expression: how far it is from rest and how far the board's
-pose is from it, in mm, on the mesh where that is most (head, tongue, teeth, eyes ...): root of the
-mean square over the vertices that the expression moves by 0.1 mm. And how many handles are used.
+The handles are set as by a click on the expression (least squares over the raw controls). For each
+expression it prints *way*, the distance of the expression from rest, *off*, the distance of the
+board's pose from the expression, and the number of used handles. Distances are root mean squares in
+mm over the vertices that the expression moves by 0.1 mm, on the mesh with the largest error.
 """
 
 from __future__ import annotations

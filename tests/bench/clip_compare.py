@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""clip_compare.py [--out FOLDER]: `.rzc` against what else packs float32 without loss, on the three
-kinds of curves of clip_curves.py. Sizes are of the curves' bytes: `.rzc` with its head, names and
-index, the others with the least that brings the curves back.
+"""clip_compare.py [--out FOLDER]: compares `.rzc` with other lossless packers of float32, on the
+three kinds of curves of clip_curves.py. Values are the size of the curves divided by the packed
+size, and the unpacking speed in GB/s. The size of `.rzc` includes its head, names and index.
 
-Each is given the curves in the way that serves it best: all of them as one array, or each control
-alone with constant ones for nothing. Packages: pcodec, zstandard, blosc2, fpzip; one that is not
-there is named. --out writes the clips, for clip_bench.
+Each other packer counts with the smaller of two sizes: all curves in one array, or each curve alone
+with constant curves at no cost. Packages: pcodec, zstandard, blosc2, fpzip; a missing package is
+listed as not installed. --out writes the clips, for clip_bench.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from clip_curves import KINDS, RATE, Curves
 from risorius import Clip
 
 Pack = Callable[[Curves], bytes]
-Unpack = Callable[[bytes, Curves], Curves]  # the second argument says the shape
-RUNS = 5  # runs; the fastest counts
+Unpack = Callable[[bytes, Curves], Curves]  # the second argument has the shape of the result
+RUNS = 5  # times that unpacking is measured; the shortest time counts
 
 
 def rzc(_: object) -> tuple[Pack, Unpack]:
@@ -42,7 +42,7 @@ def pcodec(level: int) -> tuple[Pack, Unpack]:
 
 
 def zstd(shuffled: bool) -> tuple[Pack, Unpack]:
-    """zstd at level 19. With `shuffled`, bit differences between frames are packed by bytes."""
+    """zstd at level 19. With `shuffled`, it packs uint32 differences of frames, byte by byte."""
     package = importlib.import_module("zstandard")
     compressor, decompressor = package.ZstdCompressor(level=19), package.ZstdDecompressor()
 
@@ -64,7 +64,7 @@ def zstd(shuffled: bool) -> tuple[Pack, Unpack]:
 
 
 def blosc2(_: object) -> tuple[Pack, Unpack]:
-    """zstd 9 behind its byte shuffle, as one chunk."""
+    """blosc2 with a byte shuffle and zstd at level 9, as one chunk on one thread."""
     package = importlib.import_module("blosc2")
     package.set_nthreads(1)
     codec, filters = package.Codec.ZSTD, package.Filter.SHUFFLE

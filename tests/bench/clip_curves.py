@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves of the three kinds that `.rzc` is measured with, made by formula from a fixed seed."""
+"""Generates curves of three kinds for measurements of `.rzc`, from a fixed seed."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ RATE = 60
 
 def sparse(frames: int = 3600) -> Curves:
     """Hand-keyed animation sampled at 60 fps: 72 of 260 controls have keys, 8 to 40 frames apart;
-    most segments are Bezier with automatic handles, some linear, some hold; often a key repeats the
-    value before it, so that the control rests. All else stays where it is."""
+    80 % of the segments are Bezier with automatic handles, 12 % linear, 8 % constant. A quarter of
+    the keys repeat the value before them. The other controls stay at 0."""
     rng = np.random.default_rng(SEED)
     curves = np.zeros((CONTROLS, frames), np.float32)
     for control in rng.choice(CONTROLS, 72, replace=False):
@@ -35,16 +35,16 @@ def sparse(frames: int = 3600) -> Curves:
 
 
 def _segment(kind: int, at: Curves, values: Curves, i: int, time: Curves) -> Curves:
-    """Between key i and the next, in float32 as an animation program evaluates it."""
+    """Values at `time` (frames) between keys i and i + 1; kind 0 Bezier, 1 linear, 2 constant."""
     first, last = values[i], values[i + 1]
     if kind == 2 or first == last:
         return np.full(time.size, first, np.float32)
     part = (time - at[i]) / (at[i + 1] - at[i])
     if kind == 1:
         return first + part * (last - first)
-    reach = np.float32(0.390464)  # automatic handles reach so far into a segment
+    reach = np.float32(0.390464)  # length of automatic handles, as a fraction of the segment
     slope = [np.float32(0), np.float32(0)]
-    for side, key in enumerate((i, i + 1)):  # clamped handles are level at a turning point
+    for side, key in enumerate((i, i + 1)):  # clamped handles are horizontal at a local extremum
         if 0 < key < values.size - 1:
             before, after = values[key] - values[key - 1], values[key + 1] - values[key]
             if before * after > 0:
@@ -58,7 +58,7 @@ def _segment(kind: int, at: Curves, values: Curves, i: int, time: Curves) -> Cur
 
 
 def _bezier_parameter(x: npt.NDArray[np.float64], a: float) -> npt.NDArray[np.float64]:
-    """The parameter where the times of a Bezier with handles at a and 1 - a are x."""
+    """The Bezier parameter at times x in 0..1, for handles at times a and 1 - a."""
     t = x.copy()
     b = 1.0 - a
     for _ in range(40):
@@ -69,8 +69,8 @@ def _bezier_parameter(x: npt.NDArray[np.float64], a: float) -> npt.NDArray[np.fl
 
 
 def capture(frames: int = 3600) -> Curves:
-    """A take in the style of Live Link Face: 61 columns, 60 Hz, smooth motion with the sensor's
-    noise, cut at zero, printed with ten decimals. Nine columns are angles."""
+    """A take like those of Live Link Face: 61 columns at 60 Hz, smooth motion with noise, ten
+    decimals. 52 columns are clipped to 0..1; nine columns are angles."""
     rng = np.random.default_rng(SEED + 1)
     time = np.arange(frames) / RATE
     curves = np.zeros((61, frames), np.float32)
@@ -94,8 +94,8 @@ def capture(frames: int = 3600) -> Curves:
 
 
 def speech(frames: int = 3600) -> Curves:
-    """Visemes from a voice: 40 of 260 controls move, each in a few of the sounds; every sound rises
-    and falls as a squared cosine, a phrase is followed by silence. At rest a control is 0."""
+    """Visemes of speech: 40 of 260 controls move, each in some of 15 sounds. Every sound rises and
+    falls as a squared cosine; silence follows each phrase. At rest a control is 0."""
     rng = np.random.default_rng(SEED + 2)
     curves = np.zeros((CONTROLS, frames))
     shapes = rng.random((15, 40)) * (rng.random((15, 40)) < 0.28)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""clip_stands_for.py FILE.dna ...: how much smaller a clip of controls is than the animation of the
-face that it stands for.
+"""clip_stands_for.py FILE.dna ...: compares the size of a clip of controls with the size of the
+evaluated animation of the face.
 
-What it stands for, a frame: the float32 values that the rig gives at LOD 0: nine a joint (three
-each of translation, rotation, scale), a weight a blend shape, a value an animated map. `all` counts
-every one of them; `moving` only those that take more than one value in the clip, which is what an
-exporter that drops resting channels would keep. The curves are those of clip_curves.py, spread over
-the raw controls of the rig; where it has fewer, those that move come first.
+The evaluated animation has the rig's float32 outputs at LOD 0: nine values per joint (translation,
+rotation, scale), a weight per blend shape, and a value per animated map. `all` counts all of them;
+`moving` counts only values that change in the clip, as an exporter that drops constant channels
+would. The curves of clip_curves.py are spread evenly over the raw controls of the rig. If the rig
+has fewer controls than curves, moving curves are used first.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws how joint matrices lie in the file and in a Rig: draw_layout.py OUT.png"""
+"""Draws the memory layout of joint matrices in a file and in a Rig: draw_layout.py OUT.png"""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.patches import Rectangle
 
-# Two joint groups: rows, rows that the coarse LOD keeps, and the controls of their columns.
+# Two joint groups: number of rows, number of rows in the coarse LOD, control of each column.
 GROUPS = [(7, 3, [0, 1, 3, 4]), (5, 2, [1, 2, 4])]
 CONTROLS = ["jawOpen", "smileL", "blinkL", "smileL x jawOpen", "browUp"]
 ACTIVE = {1, 3}

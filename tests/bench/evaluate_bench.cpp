@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Measures one evaluation: evaluate_bench FILE.dna [Google Benchmark's options]. A share of the raw
-// controls is active; the active controls drift from frame to frame.
+// Measures one evaluation: evaluate_bench FILE.dna [Google Benchmark's options]. A fraction of the
+// raw controls is active; the active controls change slightly from frame to frame.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -1,24 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""Time per frame of faces in Blender, against the plain way, in one run.
+"""Measures the time per frame of faces in Blender with the add-on and with plain handlers.
 
     python tests/bench/frame_time.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--frames N]
                                      [--clip CLIP.rzc]
 
 Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
 installed. FULL.dna is a file of real size (tests/fullscale/generate.py): 60 of its controls change
-at every frame, keyed in an action that is an NLA strip, with a second strip added on top. Each way
-is `scene.frame_set` with the whole dependency graph; drawing is not in it.
+at every frame, by an NLA strip with a second strip in Add mode above it. Each row times
+`scene.frame_set` with the whole dependency graph, without drawing.
 
     add-on, AUTO / LIVE / KEYS   the add-on: Direct, Live and real shape keys
-    floor of AUTO / LIVE         two poses in turn, what the add-on wrote, written by a bare loop
-    plain way                    a handler that evaluates the same rig natively and writes all bones
-                                 and all key values to the originals, in bulk; real keys, no drivers
-    plain way, loops             the same, written one by one
-    curves only                  nothing follows the controls
+    floor of AUTO / LIVE         a bare handler alternates between two poses of the add-on
+    plain way                    a handler evaluates the same rig natively and writes all bones and
+                                 all key values to the originals, in bulk; real keys, no drivers
+    plain way, loops             the same, with one assignment per bone and key
+    curves only                  no handler follows the controls
 
-With --clip a clip (tests/bench/real_frames.py) is imported and plays in place of these keys.
+With --clip, a clip (tests/bench/real_frames.py) is imported and plays instead of these keys.
 
-With --sample ten of these characters stand in one scene at their lowest level of detail.
+With --sample, also measures ten characters of SAMPLE.dna in one scene at their lowest LOD.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ import addon_utils  # noqa: E402 isort: skip
 import bare_scene  # noqa: E402
 import install_extension  # noqa: E402
 
-ANIMATED = 60  # unless --active says otherwise: captures move 60 to 100
+ANIMATED = 60  # default of --active: captured performances move 60 to 100 controls
 ROUNDS = 3
 
 
 def machine():
-    """CPU, Blender and commit, for the head of the table."""
+    """Line of text above the table: CPU, versions of Blender and Python, and commit."""
     cpu = platform.processor()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -63,13 +63,13 @@ def machine():
 
 
 def empty_scene(package):
-    """An empty file with the add-on in it."""
+    """Open an empty file with the add-on enabled."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     addon_utils.enable(package, default_set=True)
 
 
 def import_face(path, mode, lods=(0,)):
-    """Returns the control armature, the rig and the seconds that the import took."""
+    """(control armature, deforming armature, import time in seconds) of an imported face."""
     before = set(bpy.data.objects)
     begin = time.perf_counter()
     chosen = tuple(i in lods for i in range(8))
@@ -80,7 +80,7 @@ def import_face(path, mode, lods=(0,)):
 
 
 def animate(controls, frames, active=ANIMATED):
-    """Key every n-th control, so that `active` of them change at every frame; two NLA strips."""
+    """Key `active` evenly spaced controls in two NLA strips, so that they change at every frame."""
     face = controls.pose.bones["face"]
     names = [n for n in list(face.keys()) if isinstance(face[n], float)]
     data = controls.animation_data_create()
@@ -101,13 +101,13 @@ def animate(controls, frames, active=ANIMATED):
 
 
 def play(controls, clip, frames, active):
-    """What moves the controls: a clip, or without one keys of our own.
+    """Animate the controls by an imported clip, or by keys of `animate`.
 
     Args:
         controls: the control armature.
-        clip: a file, or None.
-        frames: how many are played.
-        active: how many controls change without a clip.
+        clip: path of a clip file, or None for keys.
+        frames: length of the keyed animation in frames.
+        active: number of keyed controls.
     """
     if clip is None:
         animate(controls, frames, active)
@@ -117,7 +117,7 @@ def play(controls, clip, frames, active):
 
 
 def step(frames):
-    """All times in ms of one frame."""
+    """Times in ms of frames 2 to `frames`, in ROUNDS passes."""
     scene = bpy.context.scene
     for frame in (1, 2, 3):
         scene.frame_set(frame)
@@ -131,7 +131,7 @@ def step(frames):
 
 
 def own_time(package, frames):
-    """Median ms of the add-on's own stages over one pass, as its overlay counts them."""
+    """Stage -> median ms over one pass, from the timings of the add-on's overlay."""
     timing = sys.modules[f"{package}.scene.frame.timing"]
     stages = []
     for frame in range(2, frames + 1):
@@ -141,7 +141,7 @@ def own_time(package, frames):
 
 
 def plain_way(controls, rig, path, loops):
-    """Replace the add-on by a handler that writes everything to the originals."""
+    """Replace the add-on by a handler that writes bones and keys. Returns the number of bones."""
     import numpy as np
     import risorius
 
@@ -186,7 +186,7 @@ def plain_way(controls, rig, path, loops):
 
 
 def floor(package, rig, frames):
-    """All times in ms of one frame, of a loop that writes what the add-on wrote; it is off then."""
+    """Times in ms of frames, with a handler that writes recorded poses and the add-on disabled."""
     bare = bare_scene.Bare([rig])
     for frame in (frames // 3, frames // 2):
         bpy.context.scene.frame_set(frame)
@@ -200,7 +200,7 @@ def floor(package, rig, frames):
 
 
 def row(way, times, note, base=None):
-    """One line of the table."""
+    """Print a row: median and minimum in ms, fps, and base / median. Returns the median in ms."""
     middle = statistics.median(times)
     ratio = f"{base / middle:.1f}" if base else ""
     print(
@@ -211,7 +211,7 @@ def row(way, times, note, base=None):
 
 
 def measure_full(path, package, frames, clip, active):
-    """The full-scale scene, each way. The plain way comes first: the others are told by it."""
+    """Measure all rows of the full-scale face. The plain way is first: it is the others' base."""
     print("| way | median ms | min ms | fps | times the plain way | |\n|---|---|---|---|---|---|")
     base = None
     for loops in (False, True):
@@ -237,7 +237,7 @@ def measure_full(path, package, frames, clip, active):
 
 
 def measure_crowd(path, package, frames, count=10):
-    """Several characters at their lowest level of detail."""
+    """Measure several characters in one scene at their lowest LOD."""
     empty_scene(package)
     for _ in range(count):
         controls, rig, _ = import_face(path, "AUTO", lods=range(8))

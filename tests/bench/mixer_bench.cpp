@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Measures one frame of a mixer: mixer_bench [Google Benchmark's options]. 260 controls, clips of
-// ten minutes at 60 frames per second, times between frames.
+// ten minutes at 60 frames per second, sampled at times between frames.
 #include <benchmark/benchmark.h>
 
 #include <random>
@@ -26,7 +26,7 @@ clip::Layer make_layer(std::size_t step, clip::Blend blend, unsigned seed) {
   std::uniform_real_distribution<float> value(0.0f, 0.4f);
   std::vector<float> values(kControls * kFrames), mask(kControls, 1.0f);
   for (std::size_t c = 0; c < kControls; ++c) {
-    const bool moves = c / 8 % step == 0;  // a face region's controls are neighbours
+    const bool moves = c / 8 % step == 0;  // eight consecutive controls form a region
     for (std::size_t f = 0; f < kFrames; ++f) {
       values[c * kFrames + f] = moves ? value(random) : 0.0f;
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws what `risorius bench FILE --sweep` printed: plot_growth.py GROWTH.csv OUT.png"""
+"""Plots the output of `risorius bench FILE --sweep`: plot_growth.py GROWTH.csv OUT.png"""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Point = tuple[float, float, float | None, float | None]
 
 
 def read(path: Path) -> tuple[str, dict[str, list[Point]]]:
-    """The first line, and per panel its points by x: x, us, us of csr and read or None."""
+    """The first line, and for each panel its points, sorted: (x, us, us of csr, us of read)."""
     lines = path.read_text(encoding="utf-8").splitlines()
     points: dict[str, list[Point]] = {name: [] for name in PANELS}
     for row in csv.DictReader(lines[1:]):
@@ -54,7 +54,7 @@ def draw(about: str, points: dict[str, list[Point]], out: Path) -> None:
         if len(xs) < 4:
             axis.set_xticks(xs, [f"{x:g}" for x in xs])
             axis.minorticks_off()
-    # One scale of time, so that the panels can be compared.
+    # The same range of times in all panels, so that they can be compared.
     low = min(axis.get_ylim()[0] for axis in axes)
     high = max(axis.get_ylim()[1] for axis in axes)
     for axis in axes:

@@ -1,24 +1,29 @@
 # SPDX-License-Identifier: MIT
-"""Thirty poses, each by sliders, by both face boards and by dragging the skin: what a hand does.
+"""Counts the mouse events and pixels that set 30 poses by sliders, face boards and skin drags.
 
     python tests/bench/posing_tasks.py man.dna
 
-A hand that knows its face: it knows which sliders or handles a pose needs, and, dragging, tries
-nothing in vain (of the vertices that are furthest off it takes the drag that helps most). Counted
-are presses and releases of the pointer's button: a click is two of them, a drag is two; those of
-keys (Ctrl held for one slider, Tab for the next) stand behind a +. The tool that drags is taken up
-once, as the tab of the sliders is opened once: neither is counted. Regions of sliders are closed at
-the beginning of a pose and opened by a click; the last lines have it with all of them open already,
-as they are for one who has just used them. Pixels are those that
-the pointer travels, on the layouts of the add-on: sliders of 75 or 150 pixels in rows of 22 below
-headings that are opened by a click, a head of 1.25 pixels a millimetre, a complete board 285 pixels
-high, a primary board of 41 pixels a unit, as it is framed in a window of 1366 x 768. On a board the
-hand brings each handle to where the add-on brings it for that pose. A slider or handle is set to a
-pixel. A drag is one of the add-on's: few sliders, on the screen (both axes, depth free), or, with a
-key held, one slider alone, symmetric where the pose is. Dragging ends when a tenth of the way is
-left, at as many drags as sliders are needed, or when no drag brings a twentieth of what is left.
-Error: root of the mean square over vertices that the pose moves by 0.1 mm, in mm; *way* is what it
-is at rest. The last number is how many sliders are away from rest then, left and right as one.
+The simulated user knows which sliders or handles a pose needs. When dragging, the user tries the
+vertices furthest from their targets and takes the drag that reduces the error most.
+
+Events: presses and releases of the mouse button, two for a click and two for a drag. The number
+after a + counts events of keys (Ctrl for a single slider, Tab for the next slider). Opening the
+tool or the sidebar tab is not counted. Regions of sliders are closed at the beginning of a pose
+and opened by a click; a last line gives the ratio with all regions open.
+
+Pixels: the path of the pointer. Sliders are 75 or 150 pixels wide, in rows of 22 pixels below the
+headings of their regions. The head has 1.25 pixels per mm, the complete board is 285 pixels high,
+and the primary board has 41 pixels per unit, as in a window of 1366 x 768. A slider or handle is
+set to a whole pixel; the handles of a board go where the add-on puts them for the pose.
+
+Drags: either the sparse solver of the add-on, in both screen axes and with free depth, or with
+Ctrl a single slider; both are symmetric if the pose is. Dragging ends when a tenth of the initial
+error is left, after as many drags as the pose has active controls, or when no drag removes a
+twentieth of the initial error.
+
+Error: root mean square distance in mm of the vertices that the pose moves by more than 0.1 mm;
+*way* is this distance at rest. The last number of a cell is the number of sliders that end away
+from rest; left and right count as one.
 """
 
 from __future__ import annotations
@@ -47,7 +52,7 @@ primary_table = importlib.import_module("risorius_addon_logic.character.primary_
 
 HEADING, ROW, WIDTH = 24, 22, 150.0  # pixels
 BOARD_HEIGHT, PIXELS_A_MM = 285.0, 1.25
-# Pixels of a unit of the primary board, and pixels from the face to the board's middle.
+# Pixels per unit of the primary board, and pixels from the face to the board's centre.
 PRIMARY_UNIT, PRIMARY_AWAY = 41.0, 340.0
 AWAY = 420.0  # pixels from the face to the sidebar
 ENOUGH, WORTH, CANDIDATES = 0.1, 0.05, 10
@@ -87,8 +92,8 @@ TASKS: dict[str, dict[str, float]] = {
 
 @dataclass
 class Done:
-    """The cost of a pose: events of the pointer's button, events that opened a region, events of
-    keys, travelled pixels, and the remaining error in mm."""
+    """The cost of a pose: events of the mouse button (openings: those that opened a region), events
+    of keys, the pointer's path in pixels and its position, and the remaining error in mm."""
 
     events: int = 0
     keys: int = 0
@@ -112,7 +117,7 @@ class Done:
 
 
 class Face:
-    """The head, its controls, and its projection on the screen."""
+    """The face with its largest mesh, its controls, and its projection on the screen."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         self.dna = dna
@@ -140,11 +145,11 @@ class Face:
         return self.surface.positions(raw, self.mesh).astype(float)
 
     def pixel(self, place):
-        """The place on the screen in pixels, relative to the middle of the face."""
+        """Screen position of a point in pixels, relative to the centre of the face."""
         return tuple(self.screen @ (place - self.middle) * self.mm * PIXELS_A_MM)
 
     def pairs(self, raw):
-        """The number of sliders away from rest; left and right count as one."""
+        """The number of sliders that are not at rest; left and right count as one."""
         away = np.flatnonzero(np.abs(raw) > 1e-3)
         return len({min(int(c), int(self.partners[c])) for c in away})
 
@@ -160,13 +165,13 @@ class Face:
 
 
 def apart(face, places, wanted, moving):
-    """Root mean square distance of moving vertices in mm."""
+    """Root mean square distance in mm between places and wanted, over the moving vertices."""
     off = np.linalg.norm(places - wanted, axis=1)[moving] * face.mm
     return float(np.sqrt((off**2).mean()))
 
 
 def by_sliders(face, goal):
-    """Set each control by its slider, and open the regions that are needed."""
+    """(cost, raw controls) of setting each control by its slider, in regions opened by clicks."""
     done, raw, opened = Done(), np.zeros_like(goal), {}
     headings = list(regions.TITLES)
     rows = {r: [] for r in headings}
@@ -200,7 +205,7 @@ def by_sliders(face, goal):
 
 
 def by_complete(face, goal):
-    """Set the pose by the complete board."""
+    """(cost, raw controls) of setting the pose by the complete board."""
     table = face.table
     ways = board_layout.ways_of(table, list(face.dna.raw_control_names), {})
     handles = board_layout.handles_of(table, ways, regions.region_of)
@@ -209,20 +214,20 @@ def by_complete(face, goal):
 
 
 def by_primary(face, goal):
-    """Set the pose by the primary board."""
+    """(cost, raw controls) of setting the pose by the primary board."""
     table = primary_table.table_of(list(face.dna.raw_control_names))
     board = primary_layout.lay_out(table, primary_table.handles_of(table, {}))
     return by_board(table, board, PRIMARY_UNIT, PRIMARY_AWAY, goal)
 
 
 def by_board(table, board, unit, away, goal):
-    """Set the pose by the handles of a board; a drag sets both axes of a handle.
+    """(cost, raw controls) of setting a pose by handles; a drag sets both axes of a handle.
 
     Args:
         table: GUI controls of the board.
         board: layout of its handles.
-        unit: pixels of a unit of the board.
-        away: pixels from the face to the board's middle.
+        unit: pixels per unit of the board.
+        away: pixels from the face to the board's centre.
         goal: float64[R], raw controls of the pose.
     """
     gui = board_fit.fit(table, goal[None], np.zeros((1, len(table.names))))[0]
@@ -241,7 +246,7 @@ def by_board(table, board, unit, away, goal):
 
 
 def by_drags(face, goal, moving, most):
-    """Set the pose by drags of the skin; each is the drag that reduces the error most."""
+    """(cost, raw controls) of at most `most` skin drags; each reduces the error most."""
     done, raw = Done(), np.zeros_like(goal)
     wanted = face.at(goal)
     mirrored = is_mirrored(face, goal)
@@ -259,16 +264,16 @@ def by_drags(face, goal, moving, most):
 
 
 def is_mirrored(face, goal):
-    """Whether a pose is symmetric."""
+    """Whether each control of a pose equals its partner on the other side."""
     return bool((goal == goal[face.partners]).all())
 
 
 def best_drag(face, raw, wanted, moving, mirrored):
-    """(error in mm, controls, from, to, keys) of the best drag; None if no drag helps."""
+    """(error in mm, raw controls, start, end, key events) of the best drag, or None."""
     here = face.at(raw)
     off = np.linalg.norm((wanted - here) @ face.screen.T, axis=1) * (moving & face.shown)
     picked, order = [], np.argsort(-off)
-    for vertex in order:  # choose some vertices that are far apart
+    for vertex in order:  # choose vertices at least 6 mm apart
         near = [v for v in picked if np.linalg.norm(face.rest[v] - face.rest[vertex]) * face.mm < 6]
         if not near and off[vertex] > 0:
             picked.append(int(vertex))
@@ -284,7 +289,7 @@ def best_drag(face, raw, wanted, moving, mirrored):
 
 
 def solutions(face, raw, vertex, wanted, mirrored):
-    """(controls, events of keys) of the possible results of dragging a vertex in the add-on."""
+    """(raw controls, key events) of each drag of a vertex: many sliders, or one of three alone."""
     points, targets = [(face.mesh, vertex)], [wanted[vertex]]
     ease = risorius.local_ease(
         face.surface, face.surface.jacobian(raw, face.mesh, np.array([vertex]))
@@ -358,13 +363,13 @@ def main():
 
 
 def tell(table, openings, keys, ways):
-    """Print medians of the cost of drags relative to sliders.
+    """Print the median ratios of the cost of drags to the cost of sliders.
 
     Args:
         table: array [pose, method, (events, pixels, mm, sliders)].
-        openings: number of each pose's events that opened regions.
-        keys: number of key events of each pose's drags.
-        ways: distance of each pose from rest in mm.
+        openings: for each pose, the number of events that opened regions of sliders.
+        keys: for each pose, the number of key events of its drags.
+        ways: for each pose, its root mean square distance from rest in mm.
     """
     sliders, drags = table[:, 0], table[:, 3]
     near = drags[:, 2] <= 0.2 * ways

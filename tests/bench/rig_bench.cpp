@@ -2,9 +2,9 @@
 // Compares the evaluator with a scalar CSR matrix:
 //   rig_bench FILE.dna [FRAMES20.f32 FRAMES60.f32 FRAMES_ALL.f32] [--sweep] [--progress]
 //   [--clip FRAMES.f32] [options of the library]
-// Frames are little-endian float32[frames, raw controls]; without files similar frames are made.
-// --sweep measures how the cost grows instead, and prints a row for each point: name, x, us, us of
-// csr, us of the tight read.
+// Frames are little-endian float32[frames, raw controls]; without files, frames are generated.
+// --sweep instead measures how time grows with the size of the work, and prints a row for each
+// point: name, x, us, us of csr, us of the tight read.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -36,11 +36,12 @@ namespace {
 using namespace risorius;
 using bench::Frames;
 
-// A row of the table: its base, the tight read of its active columns, and its target. With a read
-// the target is at most kReads times the read and kBeside us.
+// A row of the table: names of the benchmark, of its base, and of the tight read of its active
+// columns, and the target as text. With a read,
+// the target is at most kReads times the read plus kBeside us.
 struct Line {
   std::string name, base, read, asked;
-  double bytes = 0;  // of the active columns
+  double bytes = 0;  // size of the active columns
 };
 constexpr double kReads = 1.3, kBeside = 1.3;
 
@@ -141,7 +142,8 @@ void add_batch(const std::string& name, std::shared_ptr<const rig::Rig> rig, con
   b->UseManualTime()->Iterations(static_cast<benchmark::IterationCount>(2000 / count + 2));
 }
 
-// The least work of an evaluation of these frames. Out: the mean number of bytes
+// Adds a benchmark that only reads the data that an evaluation of these frames needs.
+// Out: mean number of bytes per frame
 double add_read(const std::string& name, std::shared_ptr<const rig::Rig> rig, const Frames& frames,
                 std::uint32_t lod) {
   auto reads = std::make_shared<bench::Reads>(bench::reads_of(*rig, frames, lod));
@@ -373,7 +375,7 @@ class Sweep {
     pair("active controls", n, one_face(rig_, 0), csr(dna_, 0), *made_.back());
     add_read("read active controls/" + std::to_string(n), rig_, *made_.back(), 0);
   }
-  // The same face with some of its joint groups.
+  // Adds points for the face with only n of its joint groups.
   void add_groups(std::size_t n) {
     smaller_.push_back(std::make_unique<dna::Dna>(dna_));
     auto& groups = smaller_.back()->behavior.joint_groups;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Compares the skinning kernel of each instruction set with two lower bounds: skin_bench. 24,000
 // vertices with 12 influences, 870 bones: random bones for each influence, or bones near each other
-// as on a face. Bound (a) reads and writes its bytes once; (b) issues its loads and multiply-adds
-// on data in the first cache.
+// as on a face. Bound (a) is the time to read and write the kernel's bytes once; bound (b) is the
+// time to issue the kernel's loads and multiply-adds on data in the first-level cache.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -26,7 +26,7 @@ struct Times {
   double median = 0, least = 0;  // us
 };
 
-// Interleaved, so that other load of the machine affects all steps alike.
+// Measures the steps in turn, so that other load of the machine affects all of them alike.
 std::vector<Times> measure(const std::vector<std::function<void()>>& steps, std::size_t rounds) {
   std::vector<std::vector<double>> all(steps.size());
   for (std::size_t r = 0; r < rounds; ++r) {
@@ -79,7 +79,7 @@ void read_whole(const void* memory, std::size_t bytes) {
   benchmark::DoNotOptimize(bench::tight_read(memory, {&lines, 1}));
 }
 
-// The first whole cache line in `values`.
+// The address of the first whole cache line in `values`.
 template <class T>
 const void* on_a_line(const std::vector<T>& values) {
   const auto address = reinterpret_cast<std::uintptr_t>(values.data());

@@ -3,16 +3,17 @@
 
     python tests/bench/sparse_drags.py man.dna [--seed N]
 
-One drag from rest of the point that moves furthest on the screen, to where it has to go: in each of
-the poses of posing_tasks.py, for 100 random points in a random pose of three sliders that move the
-point by 2 mm or more each, and for 100 random points pulled 4 to 21 pixels in any direction, which
-are often beyond what the face can do. Drags are those of the add-on: *Exact* (least squares) and
-*Near* (sparse). Counted are pairs of sliders, left and right
-as one, that change by 0.0001 or more; *extra* is how many more than the pose has. Pixels are those
-of posing_tasks.py, 1.25 a millimetre. *Needle*: of the displacement of the skin within 12 mm of the
-point, what eight rounds of averaging over neighbours take away, the most, beside how far the point
-moves; over the same of the artist's pose (of a pull: of the single best slider). Each cell is the
-median and the worst; *ms* are of the processor.
+Each case is one drag from rest. There are three sets: the poses of posing_tasks.py, dragged at the
+vertex that moves furthest on the screen; 100 random vertices with a random pose of three sliders
+that each move the vertex by more than 2 mm; and 100 random vertices pulled by 4 to 21 pixels in a
+random direction, often out of the face's reach. The add-on's two kinds of drags are compared:
+*Exact* (least squares) and *Near* (sparse).
+
+*sliders*: sliders that change by more than 0.0001, left and right as one; *extra*: this number
+minus the pose's own. *px off*: distance from the target at 1.25 pixels per mm. *needle*: the
+largest displacement within 12 mm that eight rounds of averaging over neighbours remove, relative
+to the vertex's displacement, divided by the same ratio of the artist's pose (for a pull, of the
+best single slider). *ms*: CPU time. Each cell is the median and the largest value.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ METHODS = {
 
 @dataclass
 class Case:
-    """A drag from rest: vertices and where they go, the artist's pose or None."""
+    """A drag from rest: vertices of the largest mesh, their targets, and raw controls or None."""
 
     vertices: list[int]
     targets: list[np.ndarray]
@@ -47,7 +48,7 @@ class Case:
 
 
 class Skin(posing.Face):
-    """The head with its neighbours."""
+    """The face with the edges of its largest mesh."""
 
     def __init__(self, dna: risorius.Dna) -> None:
         super().__init__(dna)
@@ -61,7 +62,7 @@ class Skin(posing.Face):
         self.pixels = posing.PIXELS_A_MM * self.mm
 
     def needle(self, raw, vertex):
-        """The spike of the posed skin around a vertex, relative to the vertex' displacement."""
+        """The largest spike of the skin near a vertex, divided by the vertex's displacement."""
         moved = self.at(raw) - self.rest
         smooth = moved
         for _ in range(ROUNDS):
@@ -73,11 +74,11 @@ class Skin(posing.Face):
         return rough / max(1e-9, float(np.linalg.norm(moved[vertex])))
 
     def pairs(self, raw):
-        """The sliders of a pose, left and right as one."""
+        """The active sliders of a pose as a set of indices; left and right count as one."""
         return {min(int(i), int(self.partners[i])) for i in np.flatnonzero(np.abs(raw) > TOUCHED)}
 
     def reachable(self):
-        """Vertices in front that some slider moves by 3 mm on the screen."""
+        """Visible vertices that a single slider moves by more than 3 mm on the screen."""
         far = np.zeros(len(self.rest))
         for control in range(len(self.names)):
             raw = np.eye(len(self.names))[control]
@@ -87,7 +88,7 @@ class Skin(posing.Face):
 
 
 def tasks(face: Skin) -> Iterator[Case]:
-    """The poses of posing_tasks.py."""
+    """A drag of the furthest moving vertex for each pose of posing_tasks.py."""
     for task in posing.TASKS.values():
         goal = face.raw_of(task)
         wanted, mirrored = face.at(goal), posing.is_mirrored(face, goal)
@@ -103,7 +104,7 @@ def tasks(face: Skin) -> Iterator[Case]:
 
 
 def poses(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
-    """Random points in random poses of three sliders that move them."""
+    """Drags of random vertices to their places in random poses of three sliders that move them."""
     random, made = np.random.default_rng(seed), 0
     zero = np.zeros(len(face.names))
     while made < COUNT:
@@ -121,7 +122,7 @@ def poses(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
 
 
 def pulls(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
-    """Random points pulled any way."""
+    """Drags of random vertices by 4 to 21 pixels in random directions."""
     random = np.random.default_rng(seed)
     for _ in range(COUNT):
         vertex, turn = int(random.choice(points)), random.uniform(0, 2 * np.pi)
@@ -130,7 +131,7 @@ def pulls(face: Skin, points: np.ndarray, seed: int) -> Iterator[Case]:
 
 
 def drag(face: Skin, case: Case, method: str, ease: bool = False):
-    """The pose that a drag makes, and how many seconds it takes without the ease."""
+    """The solved raw controls, and the CPU seconds of the solver without local_ease."""
     zero = np.zeros(len(face.names))
     reach = face.surface.jacobian(zero, face.mesh, np.array(case.vertices[:1]))
     free = np.ones(len(zero), bool)
@@ -152,7 +153,7 @@ def drag(face: Skin, case: Case, method: str, ease: bool = False):
 
 
 def measure(face: Skin, case: Case, how: dict) -> list[float]:
-    """Sliders, extra ones, pixels, needle over the artist's, milliseconds."""
+    """[sliders, extra, px off, needle, ms] of a drag, as in the module docstring."""
     raw, seconds = drag(face, case, **how)
     vertex = case.vertices[0]
     artist = case.pose

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Measures the fraction of speech frames with the right viseme, with and without a transcript.
 
-The speech is espeak-ng's, whose phoneme times are known. Parameters were chosen on the first half
-of the sentences with the voices of that half; the figures that count are those of the second half,
-whose sentences, voices, speeds and pitches played no part in the choice.
+espeak-ng speaks the sentences, so the true phoneme times are known. The parameters of
+risorius.speech were tuned on the first half of the sentences. The result that counts is the second
+half, because its sentences, voices, speeds and pitches were not used for tuning.
 
     python tests/bench/speech_accuracy.py [--half tuned|held-out] [--table]
 """
@@ -25,9 +25,9 @@ import espeak_truth
 from risorius.speech import phonemes
 from risorius.speech.phones import VISEMES, viseme_of
 
-STEP = 0.01  # seconds: a frame
+STEP = 0.01  # seconds per frame
 
-# text, voice, words a minute, pitch
+# espeak-ng voice, words per minute, pitch from 0 to 99
 TUNED_VOICES = (("en-us", 175, 50), ("en-us+f2", 150, 60), ("en-us+m3", 195, 40))
 HELD_OUT_VOICES = (("en-us+m7", 165, 45), ("en-us+f4", 180, 55), ("en-us+m1", 145, 35))
 TUNED = (
@@ -67,13 +67,13 @@ HELD_OUT = (
 
 
 def corpus(half: str) -> list[tuple[str, str, int, int]]:
-    """Each sentence of a half by one of its voices, in turn."""
+    """(text, voice, words per minute, pitch) of the sentences of a half; voices alternate."""
     texts, voices = (TUNED, TUNED_VOICES) if half == "tuned" else (HELD_OUT, HELD_OUT_VOICES)
     return [(text, *voices[i % len(voices)]) for i, text in enumerate(texts)]
 
 
 def frames(found, at: np.ndarray) -> np.ndarray:
-    """The viseme class of a list of phonemes at each time."""
+    """The viseme class of a list of phonemes at each time in seconds; "sil" between phonemes."""
     classes = np.full(len(at), "sil", dtype="<U3")
     for phone in found:
         classes[(at >= phone.begin) & (at < phone.end)] = viseme_of(phone.name)
@@ -83,7 +83,7 @@ def frames(found, at: np.ndarray) -> np.ndarray:
 def measure(
     sentences: list[tuple[str, str, int, int]], folder: Path, with_text: bool
 ) -> np.ndarray:
-    """[true class, found class]: how many frames; sentences as corpus gives them."""
+    """int[true class, found class]: numbers of frames, for sentences from corpus()."""
     table = np.zeros((len(VISEMES), len(VISEMES)), int)
     for i, (text, voice, speed, pitch) in enumerate(sentences):
         spoken = espeak_truth.say(text, voice, speed, pitch)
@@ -108,7 +108,7 @@ def commonest(table: np.ndarray) -> tuple[str, float]:
 
 
 def markdown(table: np.ndarray) -> str:
-    """Rows are true classes, columns found ones; per cent of the row's frames, and their count."""
+    """Markdown table: row true class, column found class, percent of the row's frames, count."""
     lines = [f"| true | {' | '.join(VISEMES)} | frames |", "|---" * (len(VISEMES) + 2) + "|"]
     for name, row in zip(VISEMES, table, strict=True):
         share = [f"{100 * n / max(row.sum(), 1):.0f}" if n else "" for n in row]

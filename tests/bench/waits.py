@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Measures waiting times in Blender, beside the time of Blender alone in the same scene.
+"""Measures waiting times in Blender with the add-on, and those of Blender alone in the same scene.
 
     python tests/bench/waits.py FULL.dna [--sample SAMPLE.dna] --extension ZIP [--faces 1 2 4 8]
 
 Runs inside the bpy module or an executable (blender -b --python ... --), with the add-on's zip
-installed. FULL.dna is a file of real size (tests/fullscale/generate.py); ten of SAMPLE.dna stand
-in the file that is opened and saved. The floor is measured in the same scene with the add-on off,
-in turn with ours, three times each: frames and slider steps by a bare handler that writes the same
-finished positions (with --mode LIVE the same bones and live keys), two poses in turn, that were
-read off the add-on before; undo by a plain property beside the same write; files and modes as they
-are. Times are medians in ms.
+installed. FULL.dna is a file of real size (tests/fullscale/generate.py); the .blend file for
+opening and saving contains ten characters of SAMPLE.dna. The floor is the time in the same scene
+with the add-on disabled; both are measured alternately, three times each. For frames and slider
+steps, a bare handler writes two poses alternately: vertex positions recorded from the add-on, or
+with --mode LIVE its bones and live keys. For undo, the same handler runs after a change of a
+property. Files and edit mode need no handler. Times are medians in ms.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ import numpy as np
 
 
 def median_ms(action, rounds, before=None):
-    """Median ms of an action, each time after `before`."""
+    """Median time of an action in ms; `before` runs before each, outside the measured time."""
     times = []
     for _ in range(rounds):
         if before is not None:
@@ -43,12 +43,12 @@ def median_ms(action, rounds, before=None):
 
 
 def in_turn(package, ours, floor, times=3):
-    """Medians of what both give, one after the other: the add-on is on for ours, off for the floor.
+    """[medians of ours, medians of floor], called alternately with the add-on on and off.
 
     Args:
-        package: of the add-on.
-        ours, floor: functions that give numbers, all as many.
-        times: how often both are asked.
+        package: module name of the add-on.
+        ours, floor: functions that return a number, or the same number of numbers each time.
+        times: number of calls of each function.
     """
     found = ([], [])
     for _ in range(times):
@@ -63,14 +63,14 @@ def in_turn(package, ours, floor, times=3):
 
 
 def row(name, ours, floor=None, note=""):
-    """One line of the table."""
+    """Print a table row: ms with the add-on, ms of the floor, and their ratio."""
     base = f"{floor:.1f}" if floor is not None else ""
     ratio = f"{ours / floor:.2f}" if floor else ""
     print(f"| {name} | {ours:.1f} | {base} | {ratio} | {note} |", flush=True)
 
 
 def faces(path, count, mode, lods=(0,)):
-    """So many characters of a file in an empty scene: [(control armature, deforming armature)]."""
+    """Import `count` characters of a file: [(control armature, deforming armature)]."""
     found = [frame_time.import_face(path, mode, lods)[:2] for _ in range(count)]
     for number, (controls, _) in enumerate(found):
         controls.location.x = 0.4 * number
@@ -79,7 +79,7 @@ def faces(path, count, mode, lods=(0,)):
 
 
 def measure_frames(path, package, counts, frames, mode):
-    """Playback of several full-scale faces."""
+    """Measure a frame of playback, once for each number of full-scale faces in counts."""
     for count in counts:
         frame_time.empty_scene(package)
         found = faces(path, count, mode)
@@ -112,7 +112,7 @@ def slide(controls, value):
 
 
 class Slider:
-    """Sets a slider to another value at each call."""
+    """Sets a slider to another value at each call, then calls `after`."""
 
     def __init__(self, controls, after=lambda: None):
         self.controls, self.after, self.step = controls.name, after, 0
@@ -124,7 +124,7 @@ class Slider:
 
 
 def measure_slider(path, package, rounds, mode):
-    """A slider's step, and its undo and redo."""
+    """Measure a change of a slider, and its undo and redo."""
     frame_time.empty_scene(package)
     (controls, rig), *_ = faces(path, 1, mode)
     bare, drag = bare_scene.Bare([rig]), Slider(controls)
@@ -152,7 +152,7 @@ def measure_slider(path, package, rounds, mode):
 
 
 def measure_undo(drag, steps=8):
-    """Median ms of undo and of redo of so many steps, each to the evaluated scene."""
+    """Median ms of an undo and of a redo, including the scene's evaluation, over steps - 1 each."""
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="start")
     for step in range(steps):
@@ -169,7 +169,7 @@ def measure_undo(drag, steps=8):
 
 
 def measure_switches(path, package, rounds, mode):
-    """Measure switching levels of detail, shape modes and edit mode, back and forth."""
+    """Measure switches of the LOD, of shape modes and of edit mode, in both directions."""
     frame_time.empty_scene(package)
     (controls, rig), *_ = faces(path, 1, mode, lods=range(8))
     bpy.context.view_layer.objects.active = controls

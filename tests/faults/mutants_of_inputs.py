@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Makes inputs of all commands with a few small random faults.
+"""Runs all commands with small random faults in their input files or words.
 
 In JSON, TOML and tables, a value is replaced, or a part is removed or duplicated. In binary files,
-bytes change. Sometimes a word of the command line is replaced. Each command must end with a result
-or a sentence within the limits, and a failure must leave no file.
+bytes change. Sometimes a word of the command line is replaced instead. Each command must end with a
+result or an error sentence within limits of time and memory. A failed command must leave no file.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from risorius.web import page as web_page
 from room import Done, Row, complaints
 from valid_inputs import make_inputs
 
-CPU_SECONDS = 20  # limit of a round
-MEMORY = 300 * MiB  # limit for small files, which the budgets of readers grant too
+CPU_SECONDS = 20  # limit of CPU time of a round
+MEMORY = 300 * MiB  # limit for small files; the readers of the library grant the same
 MEMORY_PER_BYTE = 40
 _PAGE = "<html><!--FACE--></html>"
 
@@ -163,7 +163,7 @@ def in_bytes(data: bytes, draw: random.Random) -> bytes:
 
 
 def in_dna(data: bytes, draw: random.Random) -> bytes:
-    """Change bytes, or change values of fields that can still be stored."""
+    """Change bytes, or change fields to values that the format can store."""
     if draw.random() < 0.4:
         return in_bytes(data, draw)
     for _ in range(8):
@@ -179,7 +179,7 @@ def _as_json(data: bytes) -> bytes:
 
 
 def in_glb(data: bytes, draw: random.Random) -> bytes:
-    """Change bytes, or the JSON at the beginning."""
+    """Change any bytes, or values in the JSON chunk."""
     if draw.random() < 0.3:
         return in_bytes(data, draw)
     (size,) = struct.unpack_from("<I", data, 12)
@@ -191,7 +191,7 @@ def in_glb(data: bytes, draw: random.Random) -> bytes:
 
 
 def in_npz(data: bytes, draw: random.Random) -> bytes:
-    """Change bytes, or an array."""
+    """Change any bytes, or the type, shape or values of an array."""
     if draw.random() < 0.3:
         return in_bytes(data, draw)
     arrays = dict(np.load(io.BytesIO(data)))
@@ -223,7 +223,7 @@ IN: dict[str, Callable[[bytes, random.Random], bytes]] = {
 
 
 def mutant(name: str, data: bytes, draw: random.Random) -> bytes:
-    """A mutated file. The faults fit its format; sometimes they are arbitrary bytes."""
+    """The file with faults for its format, or in a tenth of all cases with changed bytes."""
     kind = in_bytes if draw.random() < 0.1 else IN.get(Path(name).suffix, in_bytes)
     try:
         return kind(data, draw)
@@ -231,7 +231,7 @@ def mutant(name: str, data: bytes, draw: random.Random) -> bytes:
         return in_bytes(data, draw)
 
 
-# Name -> (files that get faults, command line). OUT.x is the output, FILE one of the files.
+# Name -> (files that get faults, command line). OUT.x is an output; FILE is one of the files.
 TRIALS: dict[str, tuple[list[str], str]] = {
     "info": (["core.dna", "face.dna"], "info FILE"),
     "info json": (["core.dna", "face.dna"], "info FILE --json"),
@@ -281,7 +281,7 @@ TRIALS: dict[str, tuple[list[str], str]] = {
     "plot": (["core.dna", "face.dna"], "plot FILE -o OUT.png --dpi 40"),
     "bench": (["frames.npz"], "bench core.dna --frames frames.npz --quick"),
 }  # fmt: skip
-SLOW = {"plot": 10, "speech": 4, "bench": 4}  # one of this number of rounds runs
+SLOW = {"plot": 10, "speech": 4, "bench": 4}  # command -> divisor of its rounds
 KEPT = ("--dry-run", "--offline", "--seconds")  # without them a round takes minutes
 QUICK = ("info", "convert json", "clip info", "clip check", "author names", "sample", "batch")
 
@@ -316,7 +316,7 @@ class Round:
                     (folder / word).write_text("old")
 
     def faults(self, folder: Path) -> list[str]:
-        """Run the command in the folder. Returns sentences on failures."""
+        """Run the command in the current folder. Returns a sentence for each broken rule."""
         before = _contents(folder)
         memory, began = _begin_peak(), time.process_time()
         signal.setitimer(signal.ITIMER_PROF, 3 * CPU_SECONDS)  # ends the process
@@ -361,7 +361,7 @@ def _run(words: list[str]) -> Done:
 
 
 def _begin_peak() -> int:
-    """Reset the system's peak memory if possible. Returns the used bytes."""
+    """Reset the peak memory of this process if possible. Returns the peak in bytes."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
     return _peak()
@@ -380,9 +380,9 @@ def rounds_of(name: str, seed: int, rounds: int, only: int | None = None) -> Row
 
     Args:
         name: one of TRIALS.
-        seed: of all rounds.
-        rounds: how many.
-        only: the one to run; None: all.
+        seed: seed of all rounds.
+        rounds: number of rounds, before it is divided by SLOW.
+        only: number of the only round to run; None: all rounds.
     """
     row = Row("mutants of inputs", name)
     with tempfile.TemporaryDirectory() as text:
@@ -425,7 +425,7 @@ def _in_a_process(work: Callable[[], None]) -> int:
 def _work(
     inputs: dict[str, bytes], name: str, seed: int, numbers: list[int], folder: Path, log: Path
 ) -> None:
-    """Rounds, each two lines of the log: its number, and with its faults when it has ended."""
+    """Run rounds; each logs its number when it begins, and [number, faults] when it ends."""
     limit = 8192 * MiB
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -451,12 +451,12 @@ def _has_page() -> bool:
 
 
 def trials(rounds: int, seed: int, names: tuple[str, ...] = ()) -> Iterator[Row]:
-    """Rows of some commands, or of all.
+    """Yield the result of some or all commands.
 
     Args:
-        rounds: of each.
-        seed: of all.
-        names: some of TRIALS.
+        rounds: number of rounds of each command.
+        seed: seed of all rounds.
+        names: keys of TRIALS; empty: all.
     """
     with (
         tempfile.TemporaryDirectory() as cache,

@@ -6,16 +6,16 @@
 870 joints; 174 GUI controls; 263 raw controls, of which 251 are expressions and 12 hold the
 rotations of `neck_01`, `neck_02` and `head`; 545 correctives of 2 to 20 factors up to 4; a solver
 of 18 poses whose outputs are factors of correctives; 122 joint groups that fill 15 % of the merged
-matrix; 782 channels; 50 meshes on 8 LODs with 12, 8 and 4 influences a vertex; centimetres, y up,
-degrees. The same seed gives the same bytes. No value of a real file is in it but two neck poses,
-which a public test states.
+matrix; 782 channels; 50 meshes on 8 LODs with 12, 8 and 4 influences per vertex; centimetres, y up,
+degrees. The same seed gives the same bytes. The file contains no values of real files except two
+neck poses, which are published in a public test.
 
-Like real files it holds content on which readers fail: GUI controls that drive nothing, raw
+Like real files it has content that readers often fail on: GUI controls that drive nothing, raw
 controls that no GUI control drives, a name of 100 characters, and equal names.
 
-With --deltas-per-channel the meshes are one head per LOD instead, each with half the vertices of
-the one before and shapes only for its LOD's channels: the input of measurements of reading by LOD.
-2500 gives a file of 50 MB.
+With --deltas-per-channel the file has only one head mesh per LOD, each with half the vertices of
+the previous LOD and shapes only for its LOD's channels. Measurements of loading single LODs use
+such files; 2500 deltas per channel give a file of 50 MB.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ PROJECT = Path(__file__).resolve().parents[2]
 JOINTS = 870
 CHANNELS = 782
 EXPRESSIONS = 251
-DRIVERS = ("neck_01", "neck_02", "head")  # joints whose rotation raw controls hold
+DRIVERS = ("neck_01", "neck_02", "head")  # joints whose rotations are stored in raw controls
 RAW = EXPRESSIONS + 4 * len(DRIVERS)
 CORRECTIVES = 545
 POSES = 18
@@ -53,7 +53,7 @@ RAW_ONLY = 18 + 4 * len(DRIVERS)  # raw controls that no GUI control drives
 MAPS = 82
 LODS = 8
 GROUPS = 122
-FILLED = 0.149  # of the merged matrix of the joint groups
+FILLED = 0.149  # filled fraction of the merged matrix of the joint groups
 HEAD_CENTRE = (0.0, 150.0, 0.0)
 # Rotations of neck_01, neck_02 and head in degrees, and the axis of the joint.
 NECK_POSES: tuple[tuple[str, int, Triple], ...] = (
@@ -89,7 +89,7 @@ MESHES: tuple[Shape, ...] = (
 )
 MESHES_OF_LOD = (9, 9, 8, 6, 6, 4, 4, 4)
 INFLUENCES = (12, 12, 12, 8, 8, 8, 4, 4)
-# One head per LOD: the grid of each has half the vertices of the one before.
+# One head per LOD; each grid has half the vertices of the previous LOD.
 HEADS: tuple[Shape, ...] = tuple(
     (
         "head",
@@ -102,7 +102,7 @@ HEADS: tuple[Shape, ...] = tuple(
 
 
 def expression_names() -> list[str]:
-    """The names of the facial expressions, of which the last is 100 characters long."""
+    """The names of the facial expressions; the last name has 100 characters."""
     words = PROJECT / "addon" / "risorius" / "language" / "controls_en.toml"
     rows = [row for row in tomllib.loads(words.read_text(encoding="utf-8")) if row != "sides"]
     known = [row.replace("*", side) for row in rows for side in ("LR" if "*" in row else " ")]
@@ -116,7 +116,7 @@ def raw_names() -> list[str]:
 
 
 def channel_names() -> list[str]:
-    """A channel for each expression, then one for each corrective; the first two have one name."""
+    """Names of a channel per expression and per corrective; the first two names are equal."""
     single = [_snake(name.partition(".")[2][:50]) for name in expression_names()]
     names = [f"head__{name}" for name in single]
     names += [f"head__cor_{i:03d}" for i in range(CHANNELS - len(names))]
@@ -162,7 +162,7 @@ def add_definition(dna: risorius.Dna) -> None:
 
 
 def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
-    """A short spine with a bush of facial joints on the surface of the head.
+    """Add a short spine and facial joints on the surface of the head.
 
     Returns:
         float32[J, 3] world positions in the neutral pose, up to the small neutral rotations.
@@ -193,7 +193,7 @@ def add_joints(dna: risorius.Dna, random: np.random.Generator) -> Floats:
 
 
 def euler_matrices(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
-    """float64[n, 3, 3]: turns about x, then y, then z."""
+    """float64[n, 3, 3]: rotation matrices for angles [n, 3] in degrees, about x, then y, then z."""
     (sx, sy, sz), (cx, cy, cz) = np.sin(np.radians(degrees.T)), np.cos(np.radians(degrees.T))
     rows = [
         [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
@@ -204,7 +204,7 @@ def euler_matrices(degrees: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def euler_angles(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The inverse of euler_matrices: float64[n, 3] degrees."""
+    """The inverse of euler_matrices: float64[n, 3] angles in degrees."""
     x = np.arctan2(turns[:, 2, 1], turns[:, 2, 2])
     y = np.arcsin(np.clip(-turns[:, 2, 0], -1, 1))
     z = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])
@@ -212,7 +212,7 @@ def euler_angles(turns: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def surface(places: NDArray[np.float64], radii: Sequence[float], centre: Sequence[float]) -> Floats:
-    """Points of an ellipsoid; places are (along, around) in 0..1."""
+    """float32[n, 3] points of an ellipsoid; places float64[n, 2]: height and angle, both 0 to 1."""
     polar, around = np.pi * (0.05 + 0.9 * places[:, 0]), 2 * np.pi * places[:, 1]
     unit = np.stack(
         [np.sin(polar) * np.sin(around), np.cos(polar), np.sin(polar) * np.cos(around)], axis=1
@@ -245,7 +245,7 @@ def add_behavior(dna: risorius.Dna, random: np.random.Generator) -> None:
 
 
 def correctives(random: np.random.Generator) -> risorius.Psds:
-    """Products of 2 to 20 expressions, most of few; some have a pose of the neck as a factor."""
+    """Correctives of 2 to 20 factors, mostly few; some have a pose of the neck as a factor."""
     sizes = np.minimum(2 + random.geometric(0.45, CORRECTIVES) - 1, 20)
     sizes[0] = 20
     columns = [np.sort(random.choice(EXPRESSIONS, n, replace=False)) for n in sizes]
@@ -261,7 +261,7 @@ def correctives(random: np.random.Generator) -> risorius.Psds:
 
 
 def add_neck_solver(dna: risorius.Dna) -> None:
-    """Poses of neck and head, by quaternions; the twist axis is x."""
+    """Add an RBF solver with poses of neck and head as quaternions; the twist axis is x."""
     targets = np.zeros((POSES, len(DRIVERS), 4))
     for row, (_name, axis, degrees) in zip(targets, NECK_POSES, strict=True):
         half = np.radians(degrees) / 2
@@ -284,7 +284,7 @@ def add_neck_solver(dna: risorius.Dna) -> None:
 
 
 def conditionals(inputs: Ints, outputs: Ints) -> risorius.Conditionals:
-    """Rows that hand a value in 0..1 through."""
+    """Table rows that copy each input to its output, limited to 0..1."""
     count = len(inputs)
     return risorius.Conditionals(
         input_indices=inputs,
@@ -297,7 +297,7 @@ def conditionals(inputs: Ints, outputs: Ints) -> risorius.Conditionals:
 
 
 def joint_group(joints: range, random: np.random.Generator) -> risorius.JointGroup:
-    """Translations and rotations of some joints; of each tenth joint the scale too."""
+    """A joint group with translations and rotations, and scales for every tenth joint."""
     rows = np.array([9 * j + k for j in joints for k in range(9 if j % 10 == 0 else 6)])
     wanted = FILLED * 9 * JOINTS * CONTROLS / (6.3 * JOINTS)
     columns = np.sort(
@@ -350,7 +350,7 @@ def make_mesh(
 
 
 def skin(points: Floats, joints: Floats, influences: int) -> tuple[Ints, Floats]:
-    """The nearest joints of each vertex, weighted by closeness; weights sum to 1."""
+    """The nearest joints of each vertex, with weights that fall with distance and sum to 1."""
     square = np.square(points).sum(1)[:, None] + np.square(joints).sum(1) - 2 * points @ joints.T
     near = np.argpartition(square, influences, axis=1)[:, :influences]
     weights = 1 / (np.maximum(np.take_along_axis(square, near, axis=1), 0) + 0.05)
@@ -362,7 +362,7 @@ def skin(points: Floats, joints: Floats, influences: int) -> tuple[Ints, Floats]
 def part_targets(
     name: str, lod: int, points: Floats, random: np.random.Generator
 ) -> list[risorius.BlendShapeTarget]:
-    """Every channel of the LOD on the head, 100 elsewhere; only the two finest LODs have shapes."""
+    """Shapes of a mesh at LOD 0 or 1: all channels for the head, 100 random ones for others."""
     if lod > 1 or len(points) < 300:
         return []
     if name == "head":
@@ -374,7 +374,7 @@ def part_targets(
 def targets(
     channels: Sequence[int], mean: float, points: Floats, random: np.random.Generator
 ) -> list[risorius.BlendShapeTarget]:
-    """A soft bump of a random patch per channel, of about so many vertices."""
+    """A shape per channel: a smooth bump on a random patch of about `mean` vertices."""
     found = []
     for channel in channels:
         size = int(np.clip(random.lognormal(np.log(mean) - 0.18, 0.6), 8, len(points) - 1))
@@ -396,7 +396,7 @@ def targets(
 def add_heads(
     dna: risorius.Dna, joints: Floats, deltas_per_channel: int, random: np.random.Generator
 ) -> None:
-    """One head per LOD, made of its LOD's joints and channels alone."""
+    """Add one head per LOD that uses only the joints and channels of its LOD."""
 
     def head(lod: int) -> risorius.Mesh:
         def shapes(points: Floats) -> list[risorius.BlendShapeTarget]:
@@ -411,7 +411,7 @@ def add_heads(
 
 
 def meshes_of(lod: int, joints: Floats, random: np.random.Generator) -> list[risorius.Mesh]:
-    """The meshes of a LOD, of half as many vertices as those of the LOD before."""
+    """The meshes of a LOD; each has about half the vertices of its mesh at the previous LOD."""
     found = []
     for name, (rows, columns), radii, centre in MESHES[: MESHES_OF_LOD[lod]]:
         grid = (max(round(rows * 2 ** (-lod / 2)), 4), max(round(columns * 2 ** (-lod / 2)), 5))
@@ -422,7 +422,7 @@ def meshes_of(lod: int, joints: Floats, random: np.random.Generator) -> list[ris
 
 
 def generate(seed: int = 1, deltas_per_channel: int | None = None) -> risorius.Dna:
-    """The whole file as a value; with deltas_per_channel its meshes are one head per LOD."""
+    """Generate the face; with deltas_per_channel, its only meshes are one head per LOD."""
     random = np.random.default_rng(seed)
     dna = risorius.Dna()
     dna.name, dna.archetype, dna.gender, dna.age = "Fullscale", "other", "other", 30

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Small faces whose lists multiply each other in a careless reader. A file's size grows with n, the
-// work of such a reader with n * n.
+// Small faces whose file size grows with n, but on which a careless reader spends n * n steps.
 #pragma once
 
 #include "rig/arrays.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Clips for tests, and the promises of the codec about any bytes.
+// Clips for tests, and functions that check the codec with arbitrary bytes.
 #pragma once
 
 #include <bit>
@@ -97,9 +97,8 @@ inline void seal(Bytes& bytes) {
   put_hash(at, bytes.size() - clip::kHashSize, bytes.size() - clip::kHashSize);
 }
 
-/// The broken promise of the codec about bytes, or an empty text. The bytes must be a clip that can
-/// be written and read again without a change, or give a sentence with a part and an offset inside
-/// the file.
+/// Reads bytes as a clip. Reading must give a clip that can be written and read again without a
+/// change, or an error with a part and an offset inside the file. Out: the broken promise, or empty
 inline std::string reading_clip(View bytes, clip::Ends ends) {
   clip::Limits limits;
   limits.values = 1u << 15;
@@ -120,7 +119,8 @@ inline std::string reading_clip(View bytes, clip::Ends ends) {
   return is_same ? "" : "written and read again a clip is another";
 }
 
-/// The same for the bytes of a block's curves.
+/// Decodes bytes as a block's curves, which must give the same success for all curves together as
+/// for each curve alone. Out: the broken promise, or empty
 inline std::string reading_curves(View bytes, std::size_t controls, std::size_t frames) {
   const auto curves = clip::EncodedCurves::open(bytes, controls, frames);
   if (!curves) return curves.error().message.empty() ? "an error that says nothing" : "";
@@ -138,7 +138,8 @@ inline std::string reading_curves(View bytes, std::size_t controls, std::size_t 
   return "";
 }
 
-/// Any bits are preserved and take hardly more space.
+/// Encodes bytes as float32 curves, which must preserve all bits and take little additional space.
+/// Out: the broken promise, or empty
 inline std::string keeping_bits(View bytes, std::size_t controls) {
   const std::size_t frames =
       std::min<std::size_t>(bytes.size() / 4 / controls, clip::kMostBlockFrames);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Small faces made in memory, and short ways to evaluate them.
+// Makes small faces in memory and evaluates them.
 #pragma once
 
 #include <gtest/gtest.h>

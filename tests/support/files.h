@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Files for tests: committed ones, and those of RISORIUS_SHARED, which a clone lacks.
+// Finds files for tests: committed files, and files in RISORIUS_SHARED, which a clone lacks.
 #pragma once
 
 #include <algorithm>
@@ -20,8 +20,8 @@ inline std::vector<std::uint8_t> read_file(const std::filesystem::path& path) {
 
 inline std::filesystem::path data_folder() { return RISORIUS_TEST_DATA; }
 
-/// A folder of RISORIUS_SHARED, or an empty path: then the caller reports that an extra did not
-/// run.
+/// A folder in RISORIUS_SHARED, or an empty path if there is none. The caller then reports that its
+/// test did not run.
 inline std::filesystem::path shared_folder(const std::string& name) {
   const char* shared = std::getenv("RISORIUS_SHARED");
   if (shared == nullptr) return {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The smallest face that has something in every layer of the format.
+// The smallest face with content in every layer of the format.
 #pragma once
 
 #include "dna/dna.h"

@@ -53,7 +53,7 @@ inline std::vector<float> floats(std::size_t n) {
   return out;
 }
 
-/// LOD l lists the first n >> l.
+/// A mapping in which LOD l lists the first n >> l indices.
 inline dna::LodMapping halving(std::uint16_t lods, std::size_t n) {
   dna::LodMapping mapping;
   mapping.lods = numbers(lods);
@@ -61,7 +61,7 @@ inline dna::LodMapping halving(std::uint16_t lods, std::size_t n) {
   return mapping;
 }
 
-/// LOD l lists only l, and `always` unless it is -1.
+/// A mapping in which LOD l lists index l, and index `always` unless `always` is -1.
 inline dna::LodMapping one_each(std::uint16_t lods, int always = -1) {
   dna::LodMapping mapping;
   mapping.lods = numbers(lods);
@@ -83,7 +83,7 @@ inline dna::BlendShapeTarget make_target(std::uint16_t channel, std::uint32_t de
   return t;
 }
 
-/// Quads over all vertices; every vertex has the first three to six joints of `joints`.
+/// A mesh of quads; each vertex is weighted to the first three to six of the joints.
 inline dna::Mesh make_head_mesh(std::uint32_t vertices, std::uint16_t joints,
                                 std::uint16_t channels, std::uint32_t deltas) {
   dna::Mesh m;
@@ -175,7 +175,7 @@ inline void add_geometry(const HeadSizes& s, dna::Dna& dna) {
   dna.geometry.meshes = std::move(meshes);
 }
 
-// One network per LOD; operations run them as well.
+// Adds one network per LOD, and operations that run the networks.
 inline void add_networks(const HeadSizes& s, dna::Dna& dna) {
   dna::MachineLearnedBehavior& ml = dna.machine_learned_behavior;
   ml.ml_control_names = names("ml", s.network_outputs);
@@ -230,7 +230,7 @@ inline void add_poses(const HeadSizes& s, dna::Dna& dna) {
   dna.rbf_behavior_ext.poses = std::move(controls);
 }
 
-/// A file's worth of everything.
+/// A complete head of the given sizes.
 inline dna::Dna make_head(const HeadSizes& s = {}) {
   dna::Dna dna = make_face(s.raw, 1, s.joints, s.lods);
   dna.descriptor.name = "head";

@@ -27,7 +27,7 @@ void* added(void* p) {
   return p;
 }
 
-// A flag of glibc in front of a block that has a mapping of its own.
+// Tests the flag that glibc stores before a block with its own memory mapping.
 bool is_mapped(void* p) { return (static_cast<std::size_t*>(p)[-1] & 2) != 0; }
 
 }  // namespace

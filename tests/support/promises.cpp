@@ -42,7 +42,7 @@ std::string broken(const std::string& promise, const core::Error& error) {
 
 // ---- sources that are not memory
 
-// A file as the parser sees it: piece by piece. From the given read on, every byte is different.
+// Serves a file to the parser in pieces. From the given read on, every byte is changed.
 class PieceSource final : public bytes::Source {
  public:
   PieceSource(View bytes, std::size_t honest_reads) : bytes_(bytes), honest_(honest_reads) {}
@@ -110,7 +110,7 @@ float largest_joint_value(const Dna& dna) {
   return most;
 }
 
-// A tenfold of a hundredfold at each of four layers stays far below the largest float.
+// Factors of 10 and 100 at each of four layers stay far below the largest float.
 bool has_moderate_networks(const Dna& dna) {
   float most = 0;
   std::size_t layers = 0;
@@ -265,7 +265,7 @@ std::string instance(const rig::Rig& rig, const Controls& raw, std::uint32_t lod
   return kKept;
 }
 
-// Evaluates every way at every LOD. Out: poses  the settled ones
+// Evaluates in every way at every LOD. Out: poses  the settled pose of each LOD
 std::string evaluate_rig(const rig::Rig& rig, const Controls& raw, std::vector<rig::Pose>& poses,
                          Origin origin = Origin::kCompiled) {
   for (std::uint32_t lod = 0; lod <= std::min(rig.lod_count, 3u); ++lod) {
@@ -304,7 +304,7 @@ std::string evaluate_on(const Dna& dna, const compile::CompileOptions& options, 
   return kKept;
 }
 
-// Scalar, and one other instruction set of this CPU.
+// The scalar kernels, and the kernels of another instruction set that this CPU supports.
 std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   std::vector<const simd::Kernels*> others;
   for (const char* name : {"sse4", "avx2", "avx512", "neon"}) {
@@ -314,7 +314,8 @@ std::array<const simd::Kernels*, 2> two_kernels(std::uint32_t choice) {
   return {&simd::scalar_kernels(), others[choice % others.size()]};
 }
 
-// If the last bits of a control differ, a table may take another row: only equal controls compare.
+// Compares poses only if their controls are equal: a control that differs in its last bits may
+// select another row of a table.
 std::string compare(const Dna& dna, const Evaluated& a, const Evaluated& b, bool tame) {
   const float tolerance = joint_tolerance(dna, a.rig);
   const bool exact = std::string_view(b.rig.kernels->name) == "sse4";

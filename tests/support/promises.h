@@ -20,7 +20,7 @@ using View = std::span<const std::uint8_t>;
 
 core::Result<dna::Dna> parse(View bytes, const dna::ParseOptions& options = {});
 
-/// A Dna, or an error with a field and an offset inside the file.
+/// Parsing gives a Dna, or an error with a field and an offset inside the file.
 std::string reading(View bytes, const core::Result<dna::Dna>& dna);
 
 /// check finds an error exactly if parse fails, and gives a place for every finding.
@@ -29,10 +29,10 @@ std::string checking(View bytes, bool is_good);
 /// A file written for a version is read again and written without a change.
 std::string rewriting(const dna::Dna& dna, std::uint16_t minor);
 
-/// JSON and back gives the same file and the same JSON.
+/// A conversion to JSON and back gives the same file and the same JSON.
 std::string json(const dna::Dna& dna);
 
-/// Text that from_json accepts gives the same JSON twice, and a file.
+/// A Dna from JSON text can be written to a file, and its JSON is stable.
 std::string json_text(std::string_view text);
 
 /// Compiles and evaluates in every way, with controls, options and a second instruction set drawn
@@ -44,13 +44,13 @@ std::string evaluation(const dna::Dna& dna, std::uint32_t seed);
 /// Bytes of a compiled rig with a corrected hash: open_rig refuses them, or they can be evaluated.
 std::string opening(View bytes, std::uint32_t seed);
 
-/// The first 8 bytes are options; the rest is the file.
+/// Number of bytes at the beginning of a fuzz input that select options; the rest is the file.
 inline constexpr std::size_t kOptionBytes = 8;
 
 /// A load of some layers and LODs equals the full load, filtered and without the other layers.
 std::string filtering(View bytes);
 
-/// The result can be written, and a second conversion changes nothing.
+/// A converted Dna can be written, and a second conversion changes nothing.
 std::string conversion(const dna::Dna& dna, View options);
 
 /// All of the above, for tests: written for its own version and for one of 2.1 to 2.8, evaluated,

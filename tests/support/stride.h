@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// For tests that change each byte of a file in turn.
+// Selects the bytes that tests change, one at a time.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace risorius::testing_support {
 
 // The sanitizers take four times as long and test every fifth byte. The plain build tests each
-// byte, and the fuzzers, which are sanitized too, test different ones every time.
+// byte, and the fuzzers, which are sanitized too, test different bytes in each run.
 #if defined(RISORIUS_STRIDE)  // an emulator takes forty times as long
 inline constexpr std::size_t kStride = RISORIUS_STRIDE;
 #elif defined(RISORIUS_SANITIZED)
@@ -28,8 +28,8 @@ struct Steps {
   std::size_t first, step;
 };
 
-// A program that runs with each instruction set changes different bytes in each, so that together
-// the runs skip few; the effect of a changed byte is the same in all of them.
+// A test program runs once for each instruction set. Each run changes different bytes, so that
+// together they skip few; a changed byte has the same effect with every instruction set.
 inline Steps shared_steps() {
   constexpr std::string_view kSets[] = {"scalar", "sse4", "avx2", "avx512", "neon"};
   constexpr std::size_t kOfOneProcessor = 4, kStep = std::max(kStride, kOfOneProcessor);
@@ -40,8 +40,8 @@ inline Steps shared_steps() {
   return {0, kStride};
 }
 
-// The bytes of a file to change: every byte, but only one in four of those that occur with the same
-// neighbours in another file whose bytes are all changed.
+// Offsets of the bytes of a file to change: all bytes, except three of four bytes that have the
+// same neighbours in another file whose bytes are all changed.
 inline std::vector<std::size_t> bytes_to_change(const std::vector<std::uint8_t>& file,
                                                 const std::vector<std::uint8_t>& other) {
   constexpr std::size_t kBefore = 24, kAround = 40;

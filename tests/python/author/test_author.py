@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joint rigs from expressions: the written file in an independent reader, and refusals."""
+"""Joint rigs from expressions: an independent reader checks written files; bad input is refused."""
 
 import copy
 import importlib.util
@@ -52,7 +52,7 @@ EIGHT = [506, 304, 182, 109, 66, 39, 24, 24]
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("egg")
-    # Budgets that are given are kept; without them a face of 506 vertices has fewer levels.
+    # Given vertex budgets are respected; without budgets a face of 506 vertices has fewer LODs.
     face_shapes.write_all(folder, more=f"[lods]\nvertices = {EIGHT}\n")
     return folder
 
@@ -104,7 +104,7 @@ def test_a_control_at_1_is_the_expression(made, name):
     dna, _ = made
     goal = wanted(dna, face_shapes.expressions(face_shapes.head()[0])[name])
     error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - goal, axis=1)
-    assert error.max() / METRES < tolerated(1.01)  # and rounding
+    assert error.max() / METRES < tolerated(1.01)  # 1 % for rounding
 
 
 def test_the_file_is_sound_and_says_what_moves(made):
@@ -146,7 +146,7 @@ def test_eight_levels_by_another_reader(read, made):
     joints = [set(level.tolist()) for level in read.lod_joints]
     assert all(a >= b for a, b in itertools.pairwise(joints))
     for level, budget in zip(joints, [40, 32, 24, 18, 12, 8, 5, 4], strict=True):
-        assert budget - 1 <= len(level) - 2 <= budget  # both of a pair or none
+        assert budget - 1 <= len(level) - 2 <= budget  # joints of both sides, or neither
     positions, _ = face_shapes.head()
     for lod in range(1, 8):
         mesh = read.geometry[read.lod_meshes[lod][0]]
@@ -160,7 +160,7 @@ def test_eight_levels_by_another_reader(read, made):
             for name, delta in face_shapes.expressions(positions).items()
         ]
         assert 10 * max(far) == pytest.approx(float(row[-1]), abs=2e-3)
-        assert max(far) < (0.5 if lod < 4 else 0.7)  # cm, of motions up to 3
+        assert max(far) < (0.5 if lod < 4 else 0.7)  # cm; motions are up to 3 cm
 
 
 def test_levels_end_before_the_picture_breaks(folder, tmp_path):
@@ -216,7 +216,7 @@ def test_hair_of_more_vertices_than_the_skin_ends_no_level():
     assert plans[0].ended == plans[1].ended
     for lod, share in ((1, 0.6), (2, 0.36), (3, 0.216)):
         cards = len(plans[1].triangles[lod, 1]) / 2
-        assert cards == int(cards)  # each is whole
+        assert cards == int(cards)  # no card is cut
         assert share * 300 < cards < share**0.5 * 300
 
 
@@ -286,7 +286,7 @@ def test_budgets_are_kept(folder, tmp_path):
     face = dna_bytes.Face(out.read_bytes())
     assert face.lod_count == 3
     for lod, (joints, vertices) in enumerate([(40, 506), (11, 120), (3, 40)]):
-        assert len(face.lod_joints[lod]) - 2 in (joints, joints - 1)  # both of a pair or none
+        assert len(face.lod_joints[lod]) - 2 in (joints, joints - 1)  # both sides, or neither
         assert len(face.geometry[face.lod_meshes[lod][0]]["positions"]) <= vertices
         assert json.loads(done.stdout)["lods"][lod]["joints"] == len(face.lod_joints[lod]) - 2
 
@@ -322,7 +322,7 @@ def test_a_seam_of_the_texture_stays_closed():
     edges = flat[:, 1:] - flat[:, :1]
     areas = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     assert (areas > 0).all()
-    assert areas.sum() / 2 == pytest.approx(2 * n * n)  # neither hole nor overlap
+    assert areas.sum() / 2 == pytest.approx(2 * n * n)  # neither holes nor overlaps
     used = np.asarray(coarse.layout_texture_coordinates, int)[triangles]
     found = np.asarray(coarse.texture_coordinates)[used] * 24 - flat
     assert np.allclose(found[flat.mean(axis=1)[:, 0] < n], 0, atol=1e-4)
@@ -397,10 +397,9 @@ def test_joints_alone_come_near(folder, tmp_path):
         error = np.linalg.norm(posed(dna, {NAMES[name]: 1}) - wanted(dna, delta), axis=1)
         row = table["CTRL_expressions." + NAMES[name]]
         assert error.max() * 1000 == pytest.approx(row["joints_largest_mm"], abs=2e-3)
-        # Motion along an arc is also fitted half the way, so its error at the end is slightly
-        # larger.
+        # Motion along an arc is also fitted at half its way, so the error at the end is larger.
         assert error.max() < 0.12 * np.linalg.norm(delta, axis=1).max() * METRES
-        if name.startswith(("mouth", "brow")):  # the others go round an eye, or a hinge
+        if name.startswith(("mouth", "brow")):  # others follow an arc
             between = max(
                 np.linalg.norm(posed(dna, {NAMES[name]: t}) - wanted(dna, t * delta), axis=1).max()
                 for t in (0.25, 0.5, 0.75)
@@ -410,13 +409,13 @@ def test_joints_alone_come_near(folder, tmp_path):
 
 def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     positions, _ = face_shapes.head()
-    opened = face_shapes.expressions(positions)["jawOpen"]  # about (0, 0, -2)
+    opened = face_shapes.expressions(positions)["jawOpen"]  # rotation about (0, 0, -2)
     (jaw,) = pivots.find_pivots(
         ["x.jawOpen"], positions, opened[None], [], np.zeros((0, 3)), jaw=False
     )
     assert np.abs(jaw.position - [0, 0, -2]).max() < 0.2
     assert jaw.expressions == (0,)
-    # A lid of vertices on a ball, which goes down on it.
+    # A lid of vertices on the surface of a ball, which slides down along it.
     middle, turn = np.array([3.0, 2.0, 7.0]), np.linspace(0.1, 0.6, 9)
     u, v = (x.ravel() for x in np.meshgrid(np.linspace(-0.7, 0.7, 9), turn))
 
@@ -433,7 +432,7 @@ def test_a_jaws_hinge_and_an_eyes_middle_are_found():
     (eye,) = pivots.find_pivots(names[:2], lid, moved[:2], ["FACIAL_L_Eye"], given, jaw=False)
     assert (eye.position == given[0]).all()
     half = lid + pivots.arc(lid, shut, middle, 0.5) - middle
-    assert np.linalg.norm(half, axis=1) == pytest.approx(1.2)  # on the ball, as the line is not
+    assert np.linalg.norm(half, axis=1) == pytest.approx(1.2)  # on the ball, not on the line
     assert np.linalg.norm(lid + 0.5 * shut - middle, axis=1).max() < 1.19
     for share, goal in ((0.0, 0 * shut), (1.0, shut)):
         assert np.allclose(pivots.arc(lid, shut, middle, share), goal, atol=1e-12)
@@ -465,7 +464,7 @@ def test_the_largest_error_is_fought_for_longer(folder, tmp_path):
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)["lods"][0]["largest_mm"]
 
-    # The result of 200 rounds differs with a compiler's rounding.
+    # The result of 200 rounds depends on the compiler's rounding.
     assert largest("--bound") < 0.98 * largest()
     more = bounded(FitOptions(rounds=300))
     assert (more.rounds, more.emphasis, more.bound) == (300, 3.0, True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Correctives: sculpts of several expressions, and found ones, in an independent reader."""
+"""Correctives from sculpts and from the search, evaluated by an independent reader."""
 
 import itertools
 import json
@@ -66,7 +66,7 @@ def test_a_sculpt_of_several_is_met_where_all_are_1(egg, name):
     positions, _ = face_shapes.head()
     goal = positions + sculpts(positions)[name]
     error = np.linalg.norm(face.vertices(at_one(*CONTROLS[name])) - goal, axis=1)
-    # Of each expression and corrective that is at work, and rounding.
+    # The tolerance of each active expression and corrective, and rounding.
     parts = len(CONTROLS[name]) + (1 if name == SCULPT else 2)
     assert 10 * error.max() < 1.02 * said["tolerance"]["mm"] * parts
 
@@ -277,7 +277,7 @@ def depth(positions):
 def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
     found, _ = corrected
     pairs = {one.controls for one in found.correctives if len(one.controls) == 2}
-    assert pairs == {(0, 1), (1, 3)}  # a and d are opposites, c touches nothing
+    assert pairs == {(0, 1), (1, 3)}  # a and d are opposites, c moves no common vertices
     assert found.skin == 0
     assert found.faulty == 2
     assert found.before["volume"] > 10
@@ -285,7 +285,7 @@ def test_pairs_that_go_into_the_ball_are_found_and_no_others(corrected):
 
 
 def test_what_has_a_corrective_is_as_somebody_wanted_it(face):
-    # The sculpt goes deeper into the ball: the search leaves it, and mends the other pair.
+    # The sculpt goes deeper into the ball: the search keeps it, and repairs the other pair.
     sculpt = push(sheet(SIDE)[0], 0.5, 9.0) / 10
     found = find_correctives(add_correctives(face, 0, [((0, 1), sculpt)]))
     assert {one.controls for one in found.correctives} == {(0, 3), (1, 3)}
@@ -300,8 +300,7 @@ def test_the_written_file_stays_out_of_the_ball_at_every_level(corrected, names)
         plain, _ = sheet(SIDE if lod == 0 else 21)
         linear = plain + sum(push(plain, *PUSHES[name]) for name in names)
         assert depth(linear).max() > 0.6
-        # Away from the ball nothing is undone. Elsewhere a vertex still goes as far as that one
-        # of the two expressions that moves it further.
+        # Vertices away from the ball stay; each goes as far down as by either expression alone.
         away = np.hypot(plain[:, 0], plain[:, 2]) > 17
         assert np.abs(posed[away] - linear[away]).max() < 1e-3
         least = np.min([push(plain, *PUSHES[name])[:, 1] for name in names], axis=0)
@@ -325,7 +324,7 @@ def test_undoing_one_part_does_not_bring_what_the_other_has_alone(face):
     def look(skin):
         return checker.look(skin / 10, [solid / 10])
 
-    # Beside the fault of 0.35 mm the undone expression raises the other one by 6 mm. Its effect
+    # Near the fault of 0.35 mm the undone expression raises the other one by 6 mm. Its effect
     # elsewhere makes undoing cheap.
     rest = plain + push(plain, -15.0, 5.0, -7.0)
     alone, both = rest + push(plain, 6.0, 2.5, 4.0), rest + push(plain, 1.35, 4.0)
@@ -395,7 +394,7 @@ def test_a_corrective_of_what_turns_is_written_before_the_joints():
     posed = skin_of(read, at_one("a", "b"))
     assert (
         np.abs(posed - linear @ turned - 10 * one.displacement).max() < 0.02
-    )  # what is less is left out
+    )  # smaller deltas are left out
     assert depth(posed @ turned.T).max() < 0.15
     assert depth(linear).max() > 0.6
 
@@ -407,21 +406,21 @@ def test_triples_are_those_of_repaired_pairs_the_worst_first():
     pairs = {(0, 1): 50.0, (1, 2): 40.0, (0, 2): 0.0, (1, 3): 90.0, (0, 3): 0.0, (4, 5): 70.0}
     sums = {on: fault(volume) for on, volume in pairs.items()}
     search = SimpleNamespace(found=dict.fromkeys([(0, 1), (1, 2), (1, 3), (4, 5)]))
-    # 2 and 3 do not meet; 0 and 2 do, and are right by themselves.
+    # 2 and 3 move no common vertices; 0 and 2 do, and their pair has no fault.
     assert triples_of(search, sums, 9) == [(0, 1, 3), (0, 1, 2)]
     assert triples_of(search, sums, 1) == [(0, 1, 3)]
 
 
 def test_pairs_are_chosen_so_that_each_kind_of_fault_falls():
-    # By one measure of all kinds, volume / 100 + folds / 5, all that has volume would come first.
+    # A single measure such as volume / 100 + folds / 5 would put all pairs with volume first.
     sums = {(0, i): SimpleNamespace(volume=100.0 + i, stretched=0, folded=0) for i in range(1, 21)}
     sums |= {(1, i): SimpleNamespace(volume=0.0, stretched=0, folded=4) for i in range(30, 50)}
-    sums[2, 50] = SimpleNamespace(volume=5.0, stretched=0, folded=0)  # what is left alone
+    sums[2, 50] = SimpleNamespace(volume=5.0, stretched=0, folded=0)  # too small to be repaired
     chosen = fairest_of(sums, 20)
     assert len(chosen) == len(set(chosen)) == 20
     folds = [on for on in chosen if on[0] == 1]
     assert 8 <= len(folds) <= 12
-    # Of each kind the worst.
+    # Of the pairs with volume, the pairs with the largest volume are chosen.
     assert {on for on in chosen if on[0] == 0} == {(0, i) for i in range(len(folds) + 1, 21)}
     assert set(fairest_of(sums, 40)) == set(fairest_of(sums, 999)) == set(sums) - {(2, 50)}
     assert fairest_of(sums, 0) == []
@@ -432,7 +431,7 @@ def test_single_controls_and_zero_are_as_before(face, corrected):
     plain, _ = sheet(SIDE)
     for name, how in PUSHES.items():
         assert np.abs(skin_of(read, at_one(name)) - plain - push(plain, *how)).max() < 1e-4
-    assert face.psd_count == 0  # what was given stays as it was
+    assert face.psd_count == 0  # the input is unchanged
 
 
 def test_half_of_both_undoes_a_quarter(corrected):
@@ -475,7 +474,7 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     found, _ = corrected
     rows = {one.controls: one.shape for one in found.correctives}
     first = add_correctives(face, found.skin, [((0, 1), rows[0, 1])])
-    # Too few joints and shapes, so that the sheet enters the ball again.
+    # Few joints and shapes approximate badly, so that the sheet enters the ball again.
     rig = make_joint_rig(first, RigOptions(FitOptions(joints=2, rounds=2), tolerance_mm=0.5)).dna
     options = CorrectiveOptions(apart=(("a", "d"),))
     again = correct_again(rig, face, options)
@@ -487,7 +486,7 @@ def test_what_joints_and_shapes_leave_is_mended_once_more(face, corrected):
     assert (rig.psd_count, again.psd_count) == (1, 2)
     for name in PUSHES:
         assert (skin_of(before, at_one(name)) == skin_of(after, at_one(name))).all()
-    # Were it sculpted, it would stay.
+    # If the first corrective were a sculpt, it would stay unchanged.
     kept = dna_bytes.Face(correct_again(rig, first, options).to_bytes())
     assert (skin_of(before, at_one("a", "b")) == skin_of(kept, at_one("a", "b"))).all()
 

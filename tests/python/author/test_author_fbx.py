@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads from FBX: pivots, orders of rotation, axes, units, in-between targets; and refusals."""
+"""Heads from FBX: pivots, orders of rotation, axes, units and in-between targets; bad files."""
 
 import command_line
 import face_shapes
@@ -102,7 +102,7 @@ class Egg:
         for number, (name, delta) in enumerate(self.moved.items()):
             channel = 100 + 10 * number
             links.append((channel, BLEND))
-            # An in-between target off the straight line, then the full one.
+            # An in-between target that is not on the straight line, then the full target.
             weights = [50.0, 100.0] if number == 1 else [100.0]
             objects.append(
                 ("Deformer", (I64(channel), f"face.{name}\0\1SubDeformer", "BlendShapeChannel"),
@@ -280,7 +280,7 @@ def test_a_skinned_head_stands_as_it_was_bound(tmp_path):
     places = {
         30: (0.0, 50.0, 0.0),
         31: (0.0, 20.0, 0.0),
-    }  # a spine and the neck on it, which is posed
+    }  # a spine and its child, a posed neck
     bound = {30: (0.0, -50.0, 0.0), 31: (0.0, -70.0, 0.0)}
     egg.links = [(30, 0), (31, 30), (20, MESH), (21, 20), (22, 20), (31, 21), (30, 22)]
     for joint, shift in places.items():

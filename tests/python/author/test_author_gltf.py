@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads from glTF: seams, sparse targets, strides, a node that turns and scales; and refusals."""
+"""Heads from glTF: seams, sparse targets, strides, rotated and scaled nodes; bad files."""
 
 import command_line
 import face_shapes
@@ -17,7 +17,7 @@ def test_a_head_is_what_was_written(tmp_path, sparse):
     path = tmp_path / "egg.glb"
     positions, moved, uvs = egg(path, sparse=sparse)
     mesh, found = gltf.read_gltf(path)
-    assert mesh.positions.shape == positions.shape  # what was double is one, in the same order
+    assert mesh.positions.shape == positions.shape  # double vertices are merged; the order stays
     np.testing.assert_allclose(mesh.positions, world(positions) + SHIFT, atol=1e-6)
     assert list(found) == list(moved)
     for name, delta in moved.items():
@@ -25,7 +25,7 @@ def test_a_head_is_what_was_written(tmp_path, sparse):
     assert len(mesh.faces) == 2 * len(face_shapes.head()[1])
     for face, uv_face in zip(mesh.faces, mesh.uv_faces, strict=True):
         for vertex, uv in zip(face, uv_face, strict=True):
-            assert vertex == uv or uv >= len(positions)  # the second of a double one
+            assert vertex == uv or uv >= len(positions)  # the second copy of a double vertex
     np.testing.assert_allclose(mesh.uvs[: len(uvs)], [1, -1] * uvs + [0, 1], atol=1e-6)
 
 

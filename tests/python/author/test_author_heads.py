@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads of several meshes, in any unit and direction: joints, sides, sizes, textures, bad input."""
+"""Heads of several meshes in any unit and direction: joints, sides, textures, bad input."""
 
 import struct
 from functools import cache
@@ -101,7 +101,7 @@ def test_every_likeness_stands_and_has_its_size(name, stand, scale, tmp_path):
         if joint in JOINTS[name]:
             at = list(dna.joint_names).index(joint)
             place = np.asarray(dna.neutral_joint_translations)[[1, at]].sum(axis=0) * 100
-            box = points.min(axis=0) + np.array([9, 12.5, 11])  # the middle of the formula's head
+            box = points.min(axis=0) + np.array([9, 12.5, 11])  # centre of the head
             assert place - box == pytest.approx(likenesses.EYE * [side, 1, 1], abs=0.1)
     said = "\n".join(found.odd)
     assert "the face looks along" in said
@@ -164,7 +164,7 @@ def test_eyes_turn_with_look_controls_by_usual_angles_or_by_those_of_the_shapes(
         assert got[:2] == pytest.approx(way[:2], abs=0.1)
     assert not np.abs(moved(found.dna, "eyeRight", "eyeLookUpL")[1]).max()
     targets = [len(m.blend_shape_targets) for m in found.dna.meshes]
-    assert targets[1:] == [1, 0]  # the eyes turn, and a pupil grows
+    assert targets[1:] == [1, 0]  # eye rotations need no targets; a growing pupil needs one
     assert found.kept == ("eyeLeft_lod", "eyeRight_lod")
 
 
@@ -203,8 +203,8 @@ def test_names_that_disagree_with_places_are_told_and_the_mesh_is_not_mirrored(t
     told = [n for n in found.odd if "names and places disagree" in n]
     assert len(told) == 1
     assert centimetres(found.dna) == pytest.approx(points, abs=1e-4)
-    assert strongest(found.dna, "mouthCornerPullL")[0][0] < -2  # as the file calls it
-    # A file that was mirrored shows its polygons' backs: that is undone.
+    assert strongest(found.dna, "mouthCornerPullL")[0][0] < -2  # the side that the file names
+    # A mirrored file shows the backs of its polygons; the reader mirrors it back.
     flipped = {**swapped, "points": points * [-1, 1, 1],
                "shapes": {n: d * [-1, 1, 1] for n, d in shapes.items()}}  # fmt: skip
     found = read(saved(tmp_path, [flipped]))
@@ -285,7 +285,7 @@ def test_the_command_line_takes_a_head_as_it_is_with_its_textures(tmp_path):
     assert not any("Teeth" in key or "Body" in key for key in said)
     assert "Teeth: its color texture is left out: PNG, JPEG, WebP or BMP" in done.stdout
     assert "its color texture has 16,384 x 16,384 pixels, 1.1 GB" in done.stdout
-    face = work.begin(dna)  # what was written still smiles on its left, and looks
+    face = work.begin(dna)  # the written face still smiles on its left, and its eyes move
     row = face.names.index("CTRL_expressions.mouthCornerPullL")
     length = np.linalg.norm(face.wanted[0][row], axis=1)
     assert np.asarray(dna.meshes[0].positions)[length.argmax()][0] > 0.02
@@ -308,11 +308,11 @@ def test_a_missing_texture_and_a_mesh_of_shared_materials_are_told(tmp_path):
     assert len(found.dna.meshes) == 1
     shared = "Head: Skin left out: polygons of other materials are joined to theirs"
     assert any(shared in note for look in found.materials.values() for note in look.notes)
-    skull = len(face_shapes.head()[1]) * 2  # the back of the head is an island
+    skull = len(face_shapes.head()[1]) * 2  # the back of the head is a separate island
     apart = read(saved(tmp_path, parts(skull), materials=materials, images=[picture]))
     assert list(apart.dna.mesh_names) == ["head_lod0_mesh", "Head_Lips_lod0_mesh"]
     assert [len(m.positions) for m in apart.dna.meshes] == [506, len(points) - 506]
-    materials[1]["name"] = "EyeWhite"  # which is cut off, as lids hide its border
+    materials[1]["name"] = "EyeWhite"  # a mesh of its own, because lids hide its border
     cut = read(saved(tmp_path, parts(half), materials=materials, images=[picture]))
     assert [cut.materials[n].name for n in cut.dna.mesh_names] == ["Skin", "EyeWhite"]
     assert sum(len(m.positions) for m in cut.dna.meshes) > len(points)

@@ -62,7 +62,7 @@ def test_no_head_becomes_heavier(head, tolerance_mm):
     asked = TOLERANCE * HEIGHT_MM if tolerance_mm is None else tolerance_mm
     assert rig.raised == (rig.tolerance_mm > asked + 1e-6)
     (errors,) = rig.errors
-    for row, column in enumerate(rig.columns):  # what is said holds of the file
+    for row, column in enumerate(rig.columns):  # the file confirms the reported errors
         (reached,) = posed_meshes(rig.dna, column, [0], shapes=True)
         (goal,) = posed_meshes(face, column, [0], shapes=True)
         off = 10 * np.linalg.norm(reached - goal, axis=1).max()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Assigning shapes of a head by their names: controls, and own expressions."""
+"""Assigns shapes of a head by their names to controls or to additional expressions."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def test_visemes_and_faces_become_expressions():
         "お": "O",
     }
     assert found.controls["Blink_L"] == ["eyeBlinkL"]
-    assert found.controls["お"] == ["O"]  # letters that every reader of DNA files takes
+    assert found.controls["お"] == ["O"]  # names that every reader of DNA files accepts
     assert found.controls["Joy"] == ["Joy"]
     assert found.notes == []
     assert matching.assign(["Blink"], {}).controls == {"Blink": ["eyeBlinkL", "eyeBlinkR"]}
 
 
 def test_the_names_of_icts_head_are_all_known():
-    # ARKit's with sides for browInnerUp and cheekPuff, and three of its own
+    # ARKit's shapes, with sides for browInnerUp and cheekPuff, and three additional shapes
     units = [u.replace("Left", "_L").replace("Right", "_R") for u in arkit.mapping()]
     names = [u for u in units if u not in ("browInnerUp", "cheekPuff", "tongueOut")]
     sided = ("browInnerUp", "cheekPuff", "cheekRaiser", "PupilDilate")
@@ -66,7 +66,7 @@ def test_the_names_of_icts_head_are_all_known():
     assert found.controls["browInnerUp_L"] == ["browRaiseInL"]
     assert found.controls["cheekPuff_R"] == ["mouthCheekBlowR"]
     assert found.controls["PupilDilate_L"] == ["eyePupilWideL"]
-    assert len(found.notes) == 2  # cheekRaiser is cheekSquint
+    assert len(found.notes) == 2  # cheekRaiser is assigned to cheekSquint
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads that are packed or quantized are as their plain twins; damaged ones are refused."""
+"""Packed or quantized heads equal the plain heads; damaged files are refused."""
 
 import functools
 import sys
@@ -13,7 +13,7 @@ from risorius.author.input.gltf import read_gltf
 from risorius.base.budget import BudgetError
 from risorius.base.errors import RisoriusError
 
-STEP = 1e-4  # metres of a quantized position
+STEP = 1e-4  # metres per step of a quantized position
 
 
 def triangles():
@@ -150,7 +150,7 @@ def test_unit_quaternions_come_back():
     )
     back = _native.unpack_buffer(packed, 50, 8, "ATTRIBUTES", "QUATERNION")
     found = np.frombuffer(back, "<i2").reshape(-1, 4) / 32767
-    assert (np.abs((found * turns).sum(axis=1)) > 1 - 1e-4).all()  # q and -q are one turn
+    assert (np.abs((found * turns).sum(axis=1)) > 1 - 1e-4).all()  # q and -q are the same rotation
 
 
 def test_what_is_packed_badly_is_one_sentence(tmp_path):
@@ -206,7 +206,7 @@ def test_damaged_bytes_are_refused_or_read(tmp_path):
         data = bytearray(whole)
         begin = (
             12 if case % 2 else 12 + int.from_bytes(whole[12:16], "little")
-        )  # all, or the packed
+        )  # the whole file, or only the packed data
         for at in random.integers(begin, len(data), 1 + case % 4):
             data[at] = int(random.integers(256))
         if case % 10 == 0:
@@ -289,7 +289,7 @@ def test_every_odd_value_of_the_json_is_one_sentence_that_names_the_file(tmp_pat
 
     everywhere = []
     head(path, packed=True, change=lambda document: everywhere.extend(places(document)))
-    everywhere = [at for at in everywhere if at and at[0] != "buffers"]  # which are written last
+    everywhere = [at for at in everywhere if at and at[0] != "buffers"]  # written last
     refused = 0
     for at in everywhere:
         head(path, packed=True, change=functools.partial(spoil, at=at))

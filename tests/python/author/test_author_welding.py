@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Vertices that a file has several times along seams are one again; lips that touch stay two."""
+"""Double vertices along seams are merged; vertices of touching lips stay separate."""
 
 import command_line
 import face_shapes
@@ -30,7 +30,7 @@ def parted(column=11):
 
 def test_a_seam_is_closed_and_its_texture_coordinates_stay():
     positions, faces, moved, was = parted()
-    noise = np.random.default_rng(5).uniform(-5e-7, 5e-7, positions.shape)  # as float32 has
+    noise = np.random.default_rng(5).uniform(-5e-7, 5e-7, positions.shape)  # like float32's
     uvs = np.random.default_rng(6).random((len(positions), 2))
     mesh = ObjMesh(positions + noise, uvs, faces.tolist(), faces.tolist())
     found, shapes = welded(mesh, list(moved.values()))
@@ -47,7 +47,7 @@ def test_what_moves_apart_and_what_is_closed_stays_two():
     positions, faces, moved, was = parted()
     mesh = ObjMesh(positions, np.zeros((0, 2)), faces.tolist(), [])
     opened = moved["jawOpen"].copy()
-    opened[506:] *= 1.01  # the other side of the cut goes further where it moves
+    opened[506:] *= 1.01  # moving vertices on the other side of the cut move 1 % further
     found, _ = welded(mesh, [opened])
     still = ~moved["jawOpen"][506:].any(axis=1)
     assert len(found.positions) == len(positions) - still.sum()

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Writes animation files like their programs: header order, decimals, quotes, line ends.
+"""Writes animation files as other programs do: header order, decimals, quotes, line ends.
 
-Sources of the forms:
+Sources of the formats:
 
 * Live Link Face: takes of the app as published recordings show them. 63 columns, 10 decimals, LF;
-  BlendShapeCount 61; timecode HH:MM:SS:FF.sss where FF counts 60 a second while rows come 30 times
-  a second; a row that the phone could not write is missing; head columns 0.0000000000 where head
-  streaming is off.
+  BlendShapeCount 61; timecode HH:MM:SS:FF.sss where FF counts 60 per second although there are
+  30 rows per second; rows that the phone could not write are missing; head columns are
+  0.0000000000 if head streaming is off.
 * Audio2Face: the solver's export {exportFps, trackPath, numPoses, numFrames, facsNames, weightMat,
   joints, rotations, translations}; and animation_frames.csv of the service, which pandas writes
   with its row numbers in a column without a header: ,timeCode,blendShapes.EyeBlinkLeft,...
@@ -62,7 +62,7 @@ def live_link_face(
     names: list[str] = COLUMNS,
     count: int | None = None,
 ) -> str:
-    """Text of a take. Args: [rows, names]; seconds since midnight of each row."""
+    """CSV text of a take. Args: rows: [rows, names]; seconds: time of each row since midnight."""
     lines = ["Timecode,BlendShapeCount," + ",".join(names)]
     stated = len(names) if count is None else count
     for at, row in zip(seconds, rows, strict=True):
@@ -127,13 +127,13 @@ def unreal_animation(curves: dict[str, dict[float, float]], mode: str = "RCIM_Li
 
 
 def rhubarb_tsv(cues: list[tuple[float, float, str]]) -> str:
-    """Start times with two decimals, a tab, the shape; X at the end; line ends LF."""
+    """Rhubarb's TSV: start in seconds with two decimals, tab, shape; shape X at the end; LF."""
     lines = [f"{start:.2f}\t{shape}\n" for start, _, shape in cues]
     return "".join(lines) + f"{cues[-1][1]:.2f}\tX\n"
 
 
 def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
-    """In the form of Boost's property tree, with 2 spaces per level."""
+    """Rhubarb's XML, formatted like Boost's property tree with 2 spaces per level."""
     rows = [
         f'    <mouthCue start="{start:.2f}" end="{end:.2f}">{shape}</mouthCue>\n'
         for start, end, shape in cues
@@ -148,7 +148,7 @@ def rhubarb_xml(cues: list[tuple[float, float, str]]) -> str:
 
 
 def rhubarb_json(cues: list[tuple[float, float, str]]) -> str:
-    """Formatted as by the tool: one cue per line."""
+    """Rhubarb's JSON, with one cue per line like Rhubarb."""
     rows = [
         f'    {{ "start": {start:.2f}, "end": {end:.2f}, "value": "{shape}" }}'
         for start, end, shape in cues
@@ -170,10 +170,7 @@ WORDS = [
 
 
 def papagayo_pgo() -> str:
-    """A Papagayo file of version 1: tabs for levels, "
-
-    " for line ends of the text.
-    """
+    """The document in version 1 of Papagayo: tabs show levels, "|" stands for a line end."""
     out = ["lipsync version 1", "voice.wav", "24", "72", "1"]
     out += ["\tVoice 1", "\thello|bob", "\t1", "\t\thello bob", "\t\t6", "\t\t35", "\t\t2"]
     for text, first, last, phonemes in WORDS:
@@ -183,7 +180,7 @@ def papagayo_pgo() -> str:
 
 
 def papagayo_pgo_json() -> str:
-    """The same document in version 2, of Papagayo-NG."""
+    """The document of papagayo_pgo in version 2, the JSON of Papagayo-NG."""
     words = [
         {
             "id": i, "text": text, "start_frame": first, "end_frame": last, "tags": [],

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Heads of which every place is known on two surfaces of other vertices.
+"""Makes pairs of heads with different vertices and known correspondences.
 
-A head of a formula is a function from directions to points: the same directions on two forms
-belong together, whatever vertices either mesh has. Heads of the generator have the same vertices
-on each person; `remeshed` gives one of them other vertices.
+A head by formula is a function from directions to points: points of the same direction correspond,
+whatever the vertices of the two meshes. All people of the generator have corresponding vertices;
+`remeshed` replaces the vertices of one of them.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from risorius import _native
 from risorius.anyhead.surface import Surface
 
 HEAD_MM = 240.0
-# Landmarks of a head of a formula: angles to the left and up, degrees.
+# Landmarks of a head by formula: angles to the left and up in degrees.
 MARKS = (
     *((-24, 12), (24, 12), (-9, 12), (9, 12), (0, -8), (-14, -26), (14, -26), (0, -52)),
     *((90, 0), (-90, 0), (0, 89)),
 )
-# Bumps: angles to the left and up, width in degrees, height as a share of the radius.
+# Bumps: angles to the left and up and width in degrees, height as a fraction of the radius.
 _BUMPS = (
     (0, -8, 9, 0.22),  # nose
     (-17, 12, 9, -0.10),  # eyes
@@ -35,7 +35,7 @@ _BUMPS = (
 
 
 def direction(left: float, up: float) -> np.ndarray:
-    """float64[3] of angles in degrees; 0, 0 is the front."""
+    """Unit vector float64[3] for angles to the left and up in degrees; (0, 0) is the front."""
     a, b = np.radians([left, up])
     return np.array([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)])
 
@@ -44,9 +44,9 @@ def form(directions: np.ndarray, seed: int = 0, size: float = 12.0) -> np.ndarra
     """float64[n, 3], the points of a head in these directions.
 
     Args:
-        directions: float64[n, 3] of length 1.
-        seed: 0: the template; others differ in proportions and in places and heights of bumps.
-        size: half the height, in any unit.
+        directions: float64[n, 3] unit vectors.
+        seed: 0: the template; other seeds change proportions and the places and heights of bumps.
+        size: half the height of the head, in any unit.
     """
     random = np.random.default_rng(seed)
     much = 1.0 if seed else 0.0
@@ -64,9 +64,9 @@ def sphere(rows: int, columns: int, turn: float = 0.0) -> tuple[np.ndarray, np.n
     """Directions float64[V, 3] and triangles int64[T, 3] of a closed sphere.
 
     Args:
-        rows: of vertices between the poles.
-        columns: of vertices around.
-        turn: of the poles from the vertical, radians.
+        rows: number of rows of vertices between the poles.
+        columns: number of vertices of a row.
+        turn: angle in radians between the line of the poles and the vertical.
     """
     up = (np.arange(rows) + 1) / (rows + 1) * np.pi - np.pi / 2
     around = np.arange(columns) / columns * 2 * np.pi
@@ -86,7 +86,7 @@ def sphere(rows: int, columns: int, turn: float = 0.0) -> tuple[np.ndarray, np.n
 
 
 def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.ndarray]:
-    """A template, a target of other vertices, and float64[V, 3] where the template's belong."""
+    """A template, a target, and float64[V, 3]: true places of the template's vertices on it."""
     directions, triangles = sphere(30, 44)
     others, corners = sphere(47, 61, turn=0.9)
     template = Surface(form(directions), triangles)
@@ -94,7 +94,7 @@ def formula_heads(seed: int, size: float = 12.0) -> tuple[Surface, Surface, np.n
 
 
 def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 0) -> list:
-    """Pairs at MARKS. Args: noise: of the points, in the unit of `true`."""
+    """(vertex, true point) at MARKS. Args: noise: random error of points, in the unit of `true`."""
     random = np.random.default_rng(seed)
     looks = template.points / np.linalg.norm(template.points, axis=1, keepdims=True)
     vertices = [int(np.argmax(looks @ direction(*mark))) for mark in MARKS]
@@ -102,7 +102,7 @@ def marked(template: Surface, true: np.ndarray, noise: float = 0.0, seed: int = 
 
 
 def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """float64[V], how far vertices lie from their true places along the surface, in its unit."""
+    """float64[V]: distances to the true places along the surface, in the surface's unit."""
     normals = Surface(true, template.triangles).normals()
     away = found - true
     return np.linalg.norm(away - (away * normals).sum(1, keepdims=True) * normals, axis=1)
@@ -110,14 +110,14 @@ def errors(template: Surface, found: np.ndarray, true: np.ndarray) -> np.ndarray
 
 @functools.cache
 def generator():
-    """The data of the generator's people; a test that has none does not run."""
+    """The data of the generator's people; without the data, the test is skipped."""
     import sample_people
 
     return sample_people.data()
 
 
 def random_person(seed: int, source):
-    """A person whose age, build, origin and features are drawn."""
+    """A person with random gender, age, build, origin and facial features."""
     from risorius_people.people import MAN
     from risorius_people.source import TARGETS
 
@@ -155,7 +155,7 @@ def random_person(seed: int, source):
 
 
 def skin_of(person, source) -> Surface:
-    """The skin of a person at its finest level, in centimetres; all have the same vertices."""
+    """A person's skin at LOD 0 in centimetres; vertices of all people correspond."""
     from risorius_people import blend_shape_face
 
     _, parts, body = blend_shape_face.assemble(source, lambda _: None, person)
@@ -165,11 +165,11 @@ def skin_of(person, source) -> Surface:
 
 
 def remeshed(skin: Surface, share: float = 0.5, seed: int = 0) -> Surface:
-    """The same surface with other vertices: edges are cut at random places, then most vertices go.
+    """The same surface with new vertices at random places of edges, simplified afterwards.
 
     Args:
-        share: of the triangles that the skin has.
-        seed: of the places.
+        share: number of triangles of the result, relative to the skin's.
+        seed: seed of the random places.
     """
     random = np.random.default_rng(seed)
     edges = skin.edges()

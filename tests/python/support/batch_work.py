@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Work for the workers of tests: slow jobs, and jobs that kill their worker."""
+"""Functions that replace the work of batch workers in tests: slow, or killing their process."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ def slow(job, threads=1):
 
 
 def deadly(job, threads=1):
-    """One clip kills its worker in the middle of a file, as a fault in native code would."""
+    """Kill the worker in the middle of writing a file, if the clip is named deadly."""
     if job.clip.stem == "deadly":
         path = job.outputs[0][1]
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -40,7 +40,7 @@ def deadly_once(job, threads=1):
 
 
 def beside_deadly(job):
-    """The deadly job kills its worker each time; the other job lasts until the third death."""
+    """The deadly job kills its worker each time; the other job waits for the third death."""
     deaths = job.clip.with_name("deaths")
     if job.clip.stem == "deadly":
         with deaths.open("ab") as file:

@@ -96,7 +96,7 @@ def mapped_rotation(c, matrices):
 
 
 def order_stays(source, target):
-    """Whether each angle becomes one angle, because the axes are rotated in the same order."""
+    """Whether each Euler angle maps to a single one, because both apply the axes in one order."""
     c = change(source, target)
     moved = ["xyz"[int(np.argmax(np.abs(c["xyz".index(a)])))] for a in source.rotation_sequence]
     return "".join(moved) == target.rotation_sequence
@@ -105,7 +105,7 @@ def order_stays(source, target):
 def local_matrices(dna, deltas=None):
     """Matrices relative to the parents, float64[joints, 4, 4]: scale, rotate, translate.
 
-    deltas: joints of a pose, float[joints, 9], added to the neutral pose.
+    deltas: float[joints, 9], added to the neutral pose, in the file's units; None: neutral pose.
     """
     system = system_of(dna)
     translations = np.asarray(dna.neutral_joint_translations, float)

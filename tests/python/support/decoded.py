@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Converts a Dna to the form of the reference's decoded golden files, by index or by name.
+"""Converts a Dna to the JSON form of the reference's golden files, by index or by name.
 
 A LOD filter of the reference keeps some indices of the complete file (design ruling 1), so filtered
 files are compared by the names of the elements.
@@ -443,7 +443,7 @@ def _mesh_by_name(m, own, old):
 
 
 def _operations_by_name(ext, own, old):
-    """Operations with the content of their networks instead of indices, and without LODs' rows."""
+    """Operations with the contents of their networks instead of indices, without LOD row counts."""
     mlp = 3
     width = stride(ext["jointsParameterKeys"], ext["jointsParameterValues"])
     types = [

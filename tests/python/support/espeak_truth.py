@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes speech with known phoneme times, which the library of espeak-ng reports."""
+"""Synthesises speech with espeak-ng, whose library reports the times of phonemes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 # espeak's names of the sounds of its American voice, by viseme class. The classes follow phonetics,
-# independent of a recogniser. A diphthong has the class of its nucleus.
+# not a recogniser. A diphthong has the class of its nucleus.
 CLASSES = {
     "sil": "_ _: _:: _! _| ?",
     "PP": "p b m m-",
@@ -135,7 +135,7 @@ def say(text: str, voice: str = "en-us", speed: int = 175, pitch: int = 50) -> S
 
 
 def _with_closures(samples, rate, names, times):
-    """The times of sounds; the silence before a stop belongs to it, except after a pause."""
+    """Begin times in seconds; the silence before a stop is counted to it, except after a pause."""
     moved = list(times)
     for i in range(1, len(names)):
         if names[i] in STOPS and CLASS_OF[names[i - 1]] != "sil":

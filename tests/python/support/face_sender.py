@@ -14,8 +14,8 @@ Each line of the standard input is a list [kind, arguments...] in JSON:
     ["bundle", [[address, [arguments]], ...]]
     ["wait", seconds]
 
-The packets of Live Link Face are packed here by hand, as the app packs them; OSC is python-osc's.
-After the last step it sends nothing, and ends.
+The packets of Live Link Face are packed here in the app's format; OSC messages are made by
+python-osc. The program ends after the last step.
 """
 
 import json

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A face with 506 vertices and its expressions, by formula: half an ellipsoid of 20 x 26 cm."""
+"""A face by formula with 506 vertices and expressions: half an ellipsoid, 26 cm high."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ ACROSS, DOWN = 23, 22
 
 
 def head():
-    """Positions in cm, float64[V, 3], and the polygons."""
+    """Positions float64[V, 3] in cm, and quads int[F, 4]."""
     u, v = np.meshgrid(np.linspace(-1.3, 1.3, ACROSS), np.linspace(1.3, -1.3, DOWN))
     x, y = 8 * np.sin(u) * np.cos(v), 13 * np.sin(v)
     z = 10 * np.cos(u) * np.cos(v)

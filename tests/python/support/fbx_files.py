@@ -3,9 +3,9 @@
 
 Header, records of (end, count, length, name), values by type letter, arrays packed with zlib from
 128 bytes on, an empty record at the end of each list; 32 bit offsets to version 7.4, 64 bit from
-7.5. A user property that moves stands on its node; its curve is linked to a curve node through
-"d|NAME", and that to the node through "NAME". So Unreal's exporter writes an animation's float
-curves. Key times count 46186158000 a second; slopes after a key and before the next are per second.
+7.5. An animated user property belongs to its node; its curve is linked to a curve node through
+"d|NAME", and the curve node to the node through "NAME", as by Unreal's exporter for float curves.
+Key times are in units of 1/46186158000 s; slopes after a key and before the next are per second.
 """
 
 from __future__ import annotations

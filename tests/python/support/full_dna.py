@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A small Dna without empty layers or lists, and all ways to change one of its fields."""
+"""A small Dna without empty layers or lists, and functions that change one of its fields."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compares sums of morph targets in a client with the rig in the same poses."""
+"""Compares a .glb's weighted morph targets, as a client adds them, with the evaluated rig."""
 
 import json
 
@@ -21,7 +21,7 @@ def units_of(take):
 
 
 def driven(weights, table):
-    """Add the weights of the combination targets, by the formulas of combinations.js."""
+    """Target weights with the weights of combination targets, as combinations.js computes them."""
     out = dict(weights)
     for row in table["combinations"]:
         a, b, c = (*np.clip([weights.get(name, 0.0) for name in row["of"]], 0, 1), 0.0, 0.0)[:3]
@@ -52,7 +52,7 @@ class Posed:
             self._where[mesh] = _nearest(self._own(mesh, rig.initial_raw_controls), rest)
 
     def targets(self, groups):
-        """The morph targets as the export finds them."""
+        """The morph targets that the export finds for these groups."""
         return find_targets(self.rig, groups, "the face")[0]
 
     def sum(self, weights):
@@ -68,7 +68,7 @@ class Posed:
         return {mesh: self._own(mesh, raw)[where] for mesh, where in self._where.items()}
 
     def raws_of(self, take):
-        """The raw controls of a take, float32[frames, R], mapped like clips."""
+        """float32[frames, R]: raw controls of a take, by the mapping of imported ARKit clips."""
         clip, _ = importing.import_file(take, self.rig.raw_control_names, mapping="arkit")
         raws = np.tile(self.rig.initial_raw_controls, (clip.frame_count, 1))
         column = {name: i for i, name in enumerate(self.rig.raw_control_names)}
@@ -78,7 +78,7 @@ class Posed:
         return raws
 
     def _own(self, mesh, raw):
-        # The sample's axes are those of glTF; its unit is the centimetre.
+        # The sample has the axes of glTF, but centimetres instead of metres.
         found = self._surface.positions(raw, self._number[mesh]).astype(np.float64)
         return found * self._sides / 100
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Writes GLB files for tests, with or without compression, and the formula's head as a GLB."""
+"""Writes GLB files for tests, with or without compression, such as the head of face_shapes."""
 
 import json
 import struct
@@ -24,7 +24,7 @@ class Glb:
         }  # fmt: skip
 
     def packed(self, data, stride, mode="ATTRIBUTES", filter_name="NONE", seen=True):
-        """Add a view compressed by meshoptimizer, in gltfpack's form: its own buffer has no data.
+        """Add a view compressed by meshoptimizer, like gltfpack; its fallback buffer has no data.
 
         `filter_name` names the filter that was already applied to the data.
         """
@@ -103,7 +103,7 @@ def world(points):
 
 
 def egg(path, *, sparse=True, change=None, matrices=None):
-    """Write the formula's head: two primitives, with each vertex of the second column twice."""
+    """Write the head of face_shapes as two primitives; vertices of its second column are double."""
     positions, faces = face_shapes.head()
     moved = face_shapes.expressions(positions)
     triangles = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])

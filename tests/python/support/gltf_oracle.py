@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads .glb files according to the specification: positions for weights of targets."""
+"""Reads .glb files by the specification and computes vertices for weights of morph targets."""
 
 import json
 import struct
@@ -38,7 +38,7 @@ class GlbFile:
         return self.binary[begin : begin + view["byteLength"]]
 
     def numbers(self, number):
-        """The numbers of an accessor as float[n, k]; bounds in the file are checked."""
+        """The numbers of an accessor as float[n, k], after a check of its stated min and max."""
         about = self.json["accessors"][number]
         kind, width = np.dtype(_KINDS[about["componentType"]]), _WIDTHS[about["type"]]
         out = np.zeros((about["count"], width), kind)
@@ -66,7 +66,7 @@ class GlbFile:
         return values
 
     def meshes(self):
-        """Name of a mesh -> (node, mesh)."""
+        """Name of a node with a mesh -> (node, mesh), both as JSON."""
         nodes = [node for node in self.json["nodes"] if "mesh" in node]
         return {node["name"]: (node, self.json["meshes"][node["mesh"]]) for node in nodes}
 
@@ -77,7 +77,7 @@ class GlbFile:
         """Vertices of a mesh in the scene, float64[V, 3], for weights of its targets.
 
         Args:
-            world: node -> float64[4, 4], where its joints are; None: at rest."""
+            world: node index -> float64[4, 4], world matrices of joints; None: at rest."""
         node, mesh = self.meshes()[name]
         [primitive] = mesh["primitives"]
         out = self.numbers(primitive["attributes"][kind])

@@ -19,7 +19,7 @@ TURNS = [f"{joint}.q{part}" for joint in ("neck_01", "head") for part in "xyzw"]
 
 
 def build() -> risorius.Dna:
-    """Build the face; the joints of both sides move alike."""
+    """Build the face; joints of both sides move symmetrically."""
     positions, _ = face_shapes.head()
     moved = face_shapes.expressions(positions)
     names = list(moved)
@@ -50,7 +50,7 @@ def build() -> risorius.Dna:
 
 
 def _skin_places(positions):
-    """Places on the skin in pairs of both sides, then places in the middle."""
+    """Places of skin joints: pairs of both sides, then places on the middle line."""
     grid = positions.reshape(face_shapes.DOWN, face_shapes.ACROSS, 3)
     right = grid[2::4, 1:11:2].reshape(-1, 3)[:24]
     middle = grid[2::5, face_shapes.ACROSS // 2][:4]

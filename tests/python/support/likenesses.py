@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heads made by formula, built like those of other programs from face, eyes, teeth and more."""
+"""Heads by formula with the meshes and shape names of other programs, saved as GLB."""
 
 import json
 import struct
@@ -7,7 +7,8 @@ import struct
 import face_shapes
 import numpy as np
 
-# Rotations of a head that looks along +z, with y up and x left; rows are the images of x, y and z.
+# Name of a direction -> rotation of a head that looks along +z, with y up and x left; rows are
+# the images of x, y and z.
 STANDS = {
     "+z": np.eye(3),
     "-z": np.array([[-1, 0, 0], [0, 1, 0], [0, 0, -1]]),
@@ -22,7 +23,7 @@ EYE, EYE_RADIUS = np.array([3.2, 3.0, 6.9]), 1.4
 
 
 def ball(middle, radius, across=12, down=8):
-    """A closed sphere: positions and triangles."""
+    """Positions and triangles of a closed sphere."""
     u = np.linspace(0, 2 * np.pi, across, endpoint=False)
     v = np.linspace(0, np.pi, down + 1)[1:-1]
     rings = np.stack(
@@ -41,7 +42,7 @@ def ball(middle, radius, across=12, down=8):
 
 
 def slab(low, high):
-    """A closed box: 26 positions and triangles."""
+    """Positions and triangles of a closed box with 26 vertices."""
     points, faces = ball((np.array(low) + high) / 2, 1.0, 8, 4)
     middle = (np.array(low) + high) / 2
     way = points - middle
@@ -59,7 +60,7 @@ def joined(*pieces):
 
 
 def skull(lopsided=False):
-    """The face of face_shapes with a nose and a back of the head: positions, triangles, shapes."""
+    """(positions, triangles, shapes) of the face of face_shapes with a nose and a skull."""
     points, quads = face_shapes.head()
     moved = face_shapes.expressions(points)
     nose = face_shapes.bump(points, 0, -1, 2.0)[:, None] * [0, 0, 2.5]
@@ -78,7 +79,7 @@ def eyes():
 
 
 def teeth():
-    """Upper and lower teeth inside the mouth."""
+    """(positions, triangles) of the upper teeth, then of the lower teeth."""
     return slab([-2, -4.5, 5], [2, -3.2, 7]), slab([-2, -8, 5], [2, -6.8, 7])
 
 
@@ -89,7 +90,7 @@ def mesh(name, geometry, shapes=None, **more):
 
 
 def with_moving_teeth(shapes):
-    """The teeth as one mesh with these shapes: the lower row moves with the jaw."""
+    """Both rows of teeth as one mesh, and its shapes: the lower row moves with the jaw."""
     whole, faces = joined(*teeth())
     half = len(whole) // 2
     hinge, angle = np.array([0, 0, -2.0]), 0.3
@@ -104,7 +105,7 @@ def with_moving_teeth(shapes):
 
 
 def ready_player(lopsided=False):
-    """Head, two eyes and teeth that have all targets, hair and body that have none."""
+    """Like Ready Player Me: head, eyes and teeth with equal targets, hair and body without any."""
     points, faces, shapes = skull(lopsided)
     left, right = eyes()
     none = {name: np.zeros_like(left[0]) for name in shapes}
@@ -124,7 +125,7 @@ def rename(shapes, names):
 
 
 def vroid():
-    """A face with three shapes that have VRoid's Fcl names, hair and a body."""
+    """Like VRoid: a face mesh with Fcl names and four materials, still teeth, hair, and a body."""
     points, faces, shapes = skull()
     told = {"jawOpen": "Fcl_MTH_A", "eyeBlinkLeft": "Fcl_EYE_Close_L",
             "eyeBlinkRight": "Fcl_EYE_Close_R"}  # fmt: skip
@@ -136,7 +137,7 @@ def vroid():
 
 
 def everything_in_one():
-    """One mesh whose separate parts are face, eyes and teeth, with names as in ICT's heads."""
+    """Like ICT FaceKit: a face with eyes and teeth as islands of the same mesh."""
     points, faces, shapes = skull()
     row, moved = with_moving_teeth(shapes)
     whole = joined((points, faces), *eyes(), row)
@@ -149,7 +150,7 @@ def everything_in_one():
 
 
 def face_cap():
-    """A head with names as browDown_L; eyes, teeth, tongue and glasses have no shapes."""
+    """Like Face Cap: a head with names such as browDown_L; eyes and teeth have no shapes."""
     points, faces, shapes = skull()
     spelled = {n: n.replace("Left", "_L").replace("Right", "_R") for n in shapes}
     return [
@@ -162,7 +163,7 @@ def face_cap():
 
 
 def placed(meshes, stand="+z", scale=0.01, shift=(0, 0, 0)):
-    """The meshes rotated as STANDS says, then scaled and moved."""
+    """The meshes rotated by STANDS[stand], then scaled and shifted."""
     turn = STANDS[stand].T * scale
     return [
         {**m, "points": m["points"] @ turn.T @ np.eye(3) + shift,
@@ -172,13 +173,13 @@ def placed(meshes, stand="+z", scale=0.01, shift=(0, 0, 0)):
 
 
 def save_glb(path, meshes, materials=(), images=()):
-    """Write meshes to a GLB file.
+    """Write meshes as a GLB.
 
     Args:
         path: path of the file.
-        meshes: results of `mesh`; "material" is an optional index into materials.
-        materials: JSON of glTF materials.
-        images: bytes of PNG files; each is also added as a texture.
+        meshes: results of `mesh`, optionally with the key `material`, an index of materials.
+        materials: JSON of the materials.
+        images: contents of PNG files; each becomes a texture.
     """
     binary, views, accessors = bytearray(), [], []
 

@@ -3,9 +3,9 @@
 
     python tests/python/support/make_selftest.py
 
-It takes some cases of each face in COMES_FROM at every LOD. It leaves out cases in which our value
-differs from the reference's (test_rig_behavior.py lists the known ones) and prints their number,
-because an error of ours would increase it.
+For each face of COMES_FROM, stores the reference's values for some of its cases at every LOD. Cases
+that the reference is known to evaluate differently (test_rig_behavior.py explains them) are left
+out. Their number is printed; a larger number than before indicates a mistake in Risorius.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ PROJECT = Path(__file__).resolve().parents[3]
 SOURCE = PROJECT / "tests" / "data" / "golden"
 TARGET = PROJECT / "native" / "python" / "risorius" / "selftest" / "golden"
 COMES_FROM = {"core": "core", "units": "units", "solvers": "tiny_v28"}
-CASES = 12  # about as many cases of each face, evenly spread
+CASES = 12  # per face, evenly spread over its golden cases
 
 
 def rows_of(name):
@@ -51,7 +51,7 @@ def rows_of(name):
 
 def main():
     TARGET.mkdir(exist_ok=True)
-    checks.content = lambda name: (TARGET / name).read_bytes()  # not the installed wheel's
+    checks.content = lambda name: (TARGET / name).read_bytes()  # not from the wheel
     for name, source in COMES_FROM.items():
         rows, left = rows_of(source)
         (TARGET / f"{name}.dna").write_bytes((SOURCE / f"{source}.dna").read_bytes())

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A second evaluator in float64, written only from the description of the format.
+"""Evaluates DNA files in double precision, directly by the semantics of the format.
 
-It shares no code with the native evaluator and has no SIMD. For each value it also returns a bound
-of the float32 error: a sum of n products in any order errs by at most (n + 1) * eps * sum|k x|, and
-the correctives among its inputs already err by (factors + 1) * eps relative.
+It shares no code with the native evaluator and does not optimise. For each value it also returns a
+bound of the float32 error: a sum of n products rounded in any order errs by at most
+(n + 1) * eps * sum|k x|, and the inputs of the sum are correctives that already err by (factors +
+1) * eps relative.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ FACTORS = 16  # larger than the number of factors of any corrective in the tests
 
 
 def table(conditionals, rows, values, output_count):
-    """Values of a conditional table and their bounds, float64[O] each."""
+    """Outputs [O] of a conditional table, and bounds [O] of their float32 errors."""
     out = np.zeros(output_count)
     size = np.zeros(output_count)
     columns = [
@@ -54,7 +55,7 @@ def correctives(dna, controls, used, settle):
 
 
 def used_controls(dna, lod):
-    """Indices of the controls that an output of the LOD reads."""
+    """The set of control indices that are read at the LOD."""
     used = set()
     for group in dna.joint_groups:
         rows = int(group.lods[lod]) if len(group.lods) else 0
@@ -107,10 +108,10 @@ def is_quaternion(dna, joint):
 
 
 def column_order(dna, group):
-    """Columns that rotate quaternion joints, in the order in which the reference stores them.
+    """Columns that rotate quaternion joints, in the order that the reference stores them.
 
-    For each LOD, finest first: the last column that is zero in all rotation rows of the LOD is
-    swapped with the column at the end, and the end moves forward by one, until there is none.
+    For each LOD, finest first: search backwards from the end for a column that is zero in all
+    rotation rows of the LOD, swap it with the column at the end, and move the end back by one.
     """
     matrix, outputs = np.asarray(group.values), np.asarray(group.output_indices).tolist()
     turning = [r for r, o in enumerate(outputs) if 3 <= o % 9 <= 5 and is_quaternion(dna, o // 9)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An independent evaluator of networks, solvers, setups and rotations in double precision.
+"""Evaluates networks, RBF solvers, twist/swing setups and rotations in double precision.
 
 It has no schedule: a frame runs networks, then solvers, then correctives, in the order of the file.
 Values that are computed later in a frame are read from the frame before. A pose is settled when a
@@ -166,7 +166,7 @@ def reduced(q, method, axis):
     twist[[axis, 3]] = q[[axis, 3]]
     length = np.linalg.norm(twist)
     if length == 0 and (method == 3 or not q.any()):
-        return np.full(4, np.nan)  # without twist and swing, no pose is near
+        return np.full(4, np.nan)  # the twist or swing is undefined, so that no pose is near
     if method == 3:
         return twist / length
     if length == 0:
@@ -264,7 +264,7 @@ def initial_controls(dna, count):
 
 
 def frame(dna, solvers, c, lod, masks=None):
-    """Run one frame on the controls `c`, whose raw controls are set; changes `c` in place."""
+    """Run one frame on the controls `c`, whose raw controls are set, and change `c` in place."""
     regions = sum(len(mesh) for mesh in dna.machine_learned_behavior.region_network_indices)
     run_networks(dna, lod, c, np.ones(regions) if masks is None else masks)
     run_solvers(dna, solvers, lod, c)
@@ -388,7 +388,7 @@ def ml_values(dna, c, lod):
 
 
 def joints(dna, c, lod, rotation):
-    """The joints of a pose from its controls, [J, 9] or [J, 10]."""
+    """Joints of a pose from its controls: [J, 9] (Euler angles) or [J, 10] (quaternions)."""
     count = len(dna.joint_names)
     linear = np.zeros(count * 9)
     turned, q_of = {}, {}

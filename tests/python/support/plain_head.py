@@ -28,9 +28,9 @@ def mask(short=0.3, apart=0.2, *, painted=False):
     """Make the skin and its expressions.
 
     Args:
-        short: share of a complete blink that is missing.
+        short: missing fraction of a complete blink, 0 to 1.
         apart: distance in cm between lips that should meet.
-        painted: True: skin covers the places of the eyes.
+        painted: True: the skin has no eye openings.
     """
     x, y = np.arange(-8, 8 + STEP / 2, STEP), np.arange(-9, 8 + STEP / 2, STEP)
     grid_x, grid_y = (g.ravel().copy() for g in np.meshgrid(x, y, indexing="ij"))
@@ -70,7 +70,7 @@ def _over_eye(points, side):
 
 
 def _slit(points, faces):
-    """Cut a mouth: the vertices of its line are doubled for the polygons below."""
+    """Cut the skin along the mouth: polygons below the line get copies of its vertices."""
     line = np.flatnonzero(
         (np.abs(points[:, 1] - MOUTH) < STEP / 4) & (np.abs(points[:, 0]) < HALF - STEP / 2)
     )
@@ -162,7 +162,7 @@ def arch(height, sign, depth=7.0):
 
 
 def eyes_and_teeth(named=True):
-    """Two eyeballs and two rows of teeth; without `named`, their names do not tell the kind."""
+    """Parts of two eyeballs and two rows of teeth; their names tell the kind only if `named`."""
     out = []
     for side, word in ((1, "Left"), (-1, "Right")):
         out.append(

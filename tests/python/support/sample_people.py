@@ -27,7 +27,7 @@ def data():
 
 @functools.cache
 def assembled(name):
-    """(dna, parts, body) of a sample person, as a face of blend shapes without hair."""
+    """(dna, parts, body) of a sample person, a face with blend shapes and without hair."""
     return blend_shape_face.assemble(data(), lambda _: None, people.PEOPLE[name])
 
 

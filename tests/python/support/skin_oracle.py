@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Skinning in float64, written from the description of the format, and a small face for it."""
+"""Skinning in float64, written from the format's description, and a small face to test it."""
 
 from __future__ import annotations
 

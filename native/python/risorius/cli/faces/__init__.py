@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Commands that make faces: author, mix, sample and solve."""
+"""Commands of the command line that make faces or solve their controls."""

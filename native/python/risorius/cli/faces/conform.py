@@ -59,10 +59,10 @@ def run(args: argparse.Namespace, clock: Clock) -> int:
 
     Args:
         args: arguments of `risorius author`.
-        clock: is called with steps and progress.
+        clock: prints the steps.
 
     Raises:
-        CommandLineError: options that do not go together.
+        CommandLineError: options exclude each other.
         RisoriusError: the face, the head or landmarks cannot be used.
         OSError: a file cannot be read or written.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius author --onto: transfers the expressions of a template to a head that has none."""
+"""risorius author --onto: transfers the expressions of a template to a head without any."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Clock(Protocol):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of --onto.
+    """Add --onto and its options.
 
     Args:
         parser: parser of `risorius author`.
@@ -91,7 +91,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_arguments(args: argparse.Namespace) -> None:
-    """Refuse options that do not go together.
+    """Refuse options that exclude each other.
 
     Args:
         args: arguments of `risorius author`.
@@ -118,29 +118,29 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def spec_of(args: argparse.Namespace) -> Spec:
-    """The spec of the head with the rig options of --rig.
+    """A spec of the head with the rig options of --rig.
 
     Args:
         args: checked arguments of `risorius author`.
 
     Raises:
-        ShapeFileError: the file of --rig is not valid.
-        OSError: it cannot be read.
+        ShapeFileError: the file of --rig cannot be used.
+        OSError: the file of --rig cannot be read.
     """
     spec = Spec(args.onto, args.onto.resolve().stem, {}, RigOptions())
     if args.rig is not None:
         spec.options, spec.correctives = read_options(args.rig)
-    if spec.options.tolerance_mm is None:  # relative to the head, without its body
+    if spec.options.tolerance_mm is None:  # a fraction of the head, not of the whole body
         spec.options = replace(spec.options, tolerance_mm=_HEAD_MM * spec.options.tolerance)
     return spec
 
 
 def read_onto(args: argparse.Namespace, clock: Clock) -> tuple[Read, dict[Path, bytes]]:
-    """Transfer the template's expressions to the head. Returns the face and files to write.
+    """The head with the template's expressions, and additional files to write: path -> bytes.
 
     Args:
         args: checked arguments of `risorius author`.
-        clock: is called with steps and progress.
+        clock: prints the steps.
 
     Raises:
         RisoriusError: the head, the template or landmarks cannot be used.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius sample: the command of the wheel with the sample people, or an error without it."""
+"""risorius sample: runs the command of the sample people's wheel, if it is installed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def _add_sentence(
     subparsers: argparse._SubParsersAction[argparse.ArgumentParser], missing: NoPeopleError
 ) -> None:
-    """Add a command that only raises the error about the missing wheel."""
+    """Add a `sample` command that only reports the missing wheel."""
 
     def say(_args: argparse.Namespace) -> int:
         raise missing

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""risorius solve: finds control curves for a moving mesh."""
+"""risorius solve: finds the control curves that reproduce the motion of a mesh."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def run(args: argparse.Namespace) -> int:
 def _counts(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace
 ) -> dict[int, int]:
-    """Mesh index -> vertex count of the meshes allowed by --mesh. Raises: CommandLineError."""
+    """Mesh index -> vertex count, for --mesh or all. Raises: CommandLineError: unknown mesh."""
     if args.mesh is None:
         return {m: surface.vertex_counts[m] for m in surface.mesh_indices}
     names = list(dna.mesh_names)[: len(surface.vertex_counts)]
@@ -124,7 +124,7 @@ def _counts(
 def _mesh(
     dna: risorius.Dna, surface: risorius.Surface, args: argparse.Namespace, take: Performance
 ) -> int:
-    """The first allowed mesh with the performance's vertex count. Raises: InputError."""
+    """Index of the mesh with the take's vertex count. Raises: InputError: no mesh has it."""
     counts = _counts(dna, surface, args)
     found = take.frames.shape[1]
     for mesh, count in counts.items():
